@@ -79,20 +79,15 @@ class NarrowCommander:
 
     def restart(self, sample: int) -> None:
         self.write_down()
-        first = self.machine.initial()
-        self.two_way_state = first._replace(codec=first.codec._replace(sample=sample))
+        self.two_way_state = self.machine.initial(sample)
         if self._begins is not None:
             outputs = self.machine.codec.model.measured(self.state.model)
             self._begins(sample * self._terms.ticks_per_sample, outputs)
 
     def carry_on(self, sample: int, silent_samples: int) -> None:
         machine, state = self.machine, self.two_way_state
-        first = machine.initial()
-        anew = first._replace(
-            codec=first.codec._replace(sample=sample),
-            commands=(state.hold,) * machine.lead_ticks,
-            hold=state.hold,
-        )
+        known = (state.hold,) * machine.lead_ticks
+        anew = machine.initial(sample)._replace(commands=known, hold=state.hold)
         paused = sample - state.sample
         if not 0 <= paused <= self._terms.history_samples:
             self.two_way_state = anew

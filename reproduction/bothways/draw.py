@@ -52,6 +52,8 @@ def _errors(paths: list[Path], found: Points) -> None:
                     capsize=2,
                     label=f"{baud} down",
                 )
+            if axis == "trip":
+                panel.set_xticks([0, *TRIPS])
             panel.set(yscale="log", ylim=(BEST, 1.1 * WORST))
             panel.set_yticks([1, 1.2, 1.5, 2, 3, 5, 10], ["1", "1.2", "1.5", "2", "3", "5", "10"])
             panel.set_yticks([], minor=True)

@@ -27,7 +27,13 @@ from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.summary import gap_part, link_part, receiver_part, transmitter_part
+from tenbaud.flight.summary import (
+    gap_part,
+    link_part,
+    narrow_part,
+    receiver_part,
+    transmitter_part,
+)
 from tenbaud.flight.trouble import Trouble
 from tenbaud.flight.viewing import ALONE, ENDS, Viewing
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
@@ -40,7 +46,6 @@ from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from transmitter.loops.virtual import LinkPeer
-from transmitter.session.down_symbols import NarrowFollowing
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -270,25 +275,22 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "guard": node.guard.state.value,
         "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
-        **_confirmation(run),
+        **_narrow(run),
     }
 
 
-def _confirmation(run: TransmitterRun) -> Status:
-    """Return what is known of the receiver's state, where down symbols alone tell it."""
-    following = run.node.session.following
-    if not isinstance(following, NarrowFollowing):
+def _narrow(run: TransmitterRun) -> Status:
+    """Return the figures of a narrow downlink, with those of this moment."""
+    part = narrow_part(run)
+    if not part:
         return {}
-    listed = following.hypotheses
-    return {
-        "confirmed_to": listed.next_confirmed,
+    listed = run.node.session.following.hypotheses  # type: ignore[attr-defined]
+    now = {
         "unconfirmed": listed.next_heard - listed.next_confirmed,
         "copies": listed.size,
-        "rest": listed.rest,
-        "hash_symbols": run.node.session.counts["hash_symbols"],
-        "down_baud": run.endpoint.down_baud.baud,
-        "law_beside_plant": run.agreement.terms.is_mirrored,
+        "baud": run.endpoint.down_baud.baud,
     }
+    return {"narrow": part["narrow"] | now}
 
 
 def _tape(words: Sequence[tuple[Word, tuple[int, ...] | None]]) -> Status:

@@ -7,7 +7,7 @@ terminal without Unicode gets the same in plain characters.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.table import Table
@@ -76,8 +76,8 @@ class Screen:
             table.add_row("lockstep", _lockstep(status))
         if counts := _counts(status):
             table.add_row("line", counts)
-        if status.get("law_beside_plant"):
-            table.add_row("law", "beside the plant too")
+        for place, line in enumerate(_down(status["narrow"]) if status.get("narrow") else ()):
+            table.add_row("" if place else "down", line)
         return table
 
     def _output(self, table: Table, one: Status) -> None:
@@ -152,39 +152,34 @@ def _time_text(status: Status) -> str:
 
 
 def _lockstep(status: Status) -> Text:
-    if status.get("confirmed_to") is not None:
-        return _confirmed(status)
     desyncs = status["desyncs"]
     text = Text("equal" if status["phase"] == "flying" else "open", style="green")
     if status["phase"] != "flying":
         text.stylize("yellow")
-    text.append(f"  {status['digest_checks']} digests", style="default")
-    text.append(f", {desyncs} differed", style="red" if desyncs else "default")
+    if narrow := status.get("narrow"):
+        text = Text(f"certain before sample {narrow['confirmed_to']}", style=text.style)
+        text.append(f", {narrow['unconfirmed']} behind; {narrow['copies']} copies", style="default")
+        text.append(f", rest {narrow['rest']:.0e}", style="default")
+    else:
+        text.append(f"  {status['digest_checks']} digests", style="default")
+        text.append(f", {desyncs} differed", style="red" if desyncs else "default")
     if status.get("rejoins"):
         text.append(f", {status['rejoins']} rejoins", style="yellow")
     return text
 
 
-def _confirmed(status: Status) -> Text:
-    """Return what down symbols tell of the receiver's state."""
-    text = Text(f"certain before sample {status['confirmed_to']}", style="green")
-    text.append(
-        f", {status['unconfirmed']} behind, {status['hash_symbols']} hash bits", style="default"
-    )
-    text.append(f"; {status['copies']} copies, rest {status['rest']:.0e}", style="default")
-    if status.get("rejoins"):
-        text.append(f", {status['rejoins']} rejoins", style="yellow")
-    return text
+def _down(narrow: Status) -> Iterator[str]:
+    """Yield what is to be known of a narrow downlink, line by line."""
+    if bits := narrow["hash_bits_per_sample"]:
+        yield f"a difference stays unseen for n samples with 2^(-{bits:.2g} n)"
+    rate = "" if narrow["baud"] is None else f"{narrow['baud']:.2f} symbols/s"
+    law = "the law runs beside the plant too" if narrow["scheme"] == "mirrored" else ""
+    yield "; ".join(filter(None, (rate, law)))
 
 
 def _counts(status: Status) -> str:
     words = []
-    for name, form in (
-        ("baud", "{:.2f} baud"),
-        ("down_baud", "{:.2f} symbols/s down"),
-        ("erasures", "{} erased"),
-        ("guard", "guard {}"),
-    ):
+    for name, form in (("baud", "{:.2f} baud"), ("erasures", "{} erased"), ("guard", "guard {}")):
         if status.get(name) is not None:
             words.append(form.format(status[name]))
     return "  ".join(words)

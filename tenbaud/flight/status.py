@@ -47,14 +47,15 @@ def status_line(status: Status) -> str:
         ("rms_over_floor", "floor x", "{:.1f}"),
         ("erasures", "erased", "{}"),
         ("guard", "guard", "{}"),
-        ("unconfirmed", "unconfirmed", "{}"),
-        ("copies", "copies", "{}"),
-        ("rest", "rest", "{:.0e}"),
-        ("down_baud", "down", "{:.1f}/s"),
         ("kept_symbols_per_s", "TOO SLOW: symbols/s in time", "{:.0f}"),
     ):
         if status.get(name) is not None:
             words.append(f"{label} {form.format(status[name])}")
-    if status.get("law_beside_plant"):
-        words.append("law beside the plant")
+    if narrow := status.get("narrow"):
+        words += [f"{name} {narrow[name]}" for name in ("unconfirmed", "copies")]
+        words.append(f"rest {narrow['rest']:.0e}")
+        if narrow["baud"] is not None:
+            words.append(f"down {narrow['baud']:.1f}/s")
+        if narrow["scheme"] == "mirrored":
+            words.append("law beside the plant")
     return "  ".join(words)

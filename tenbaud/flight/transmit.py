@@ -25,6 +25,7 @@ from transmitter.guard import GuardCause
 from transmitter.loops.flight import Flight
 from transmitter.loops.real import RealFlight
 from transmitter.loops.virtual import VirtualFlight
+from transmitter.session.down_symbols import NarrowFollowing
 from transmitter.session.session import Phase
 
 UPRIGHT = ("pendulum", "rotary pendulum")
@@ -173,11 +174,19 @@ def _not_flown(run: TransmitterRun) -> Outcome | None:
     return Outcome(ExitCode.NOT_FLOWN, text, faults)
 
 
+LATEST_CERTAIN_SAMPLES = 64
+"""By which a sample of a narrow downlink is certain as a rule, where no one has been yet."""
+
+
 def flight_counts(run: TransmitterRun) -> FlightCounts:
     """Return the counts for the verdict on a flight."""
     node, session = run.node, run.node.session
+    samples = -(-run.ticks // run.agreement.terms.ticks_per_sample)
+    if isinstance(session.following, NarrowFollowing):
+        # The last samples of a flight are not certain yet when it ends.
+        samples = max(0, samples - (session.following.certainty.delay_max or LATEST_CERTAIN_SAMPLES))
     return FlightCounts(
-        samples=-(-run.ticks // run.agreement.terms.ticks_per_sample),
+        samples=samples,
         confirmed=session.counts["confirmed"],
         erased=session.counts["erasures"],
         rejoins=session.counts["rejoins"],

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING
 from channel.codec.codec import ERASED, Alphabet, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWayState
 from receiver.controllers.references import Reference
-from transmitter.session.down_symbols import initial_at
 
 if TYPE_CHECKING:
     # Packing imports on bare Python: the page of the documentation does it in the browser.
@@ -102,7 +101,7 @@ def _start_hex(agreement: Agreement, epoch: Epoch) -> str | None:
     codec, machine, sample = agreement.codec, agreement.two_way, epoch.start.sample
     if machine is not None and epoch.two_way is not None:
         both = epoch.two_way
-        return None if both == initial_at(machine, sample) else machine.pack(both).hex()
+        return None if both == machine.initial(sample) else machine.pack(both).hex()
     initial: CodecState = codec.initial()._replace(sample=sample)
     return None if epoch.start == initial else codec.pack(epoch.start).hex()
 

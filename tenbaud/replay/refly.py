@@ -73,7 +73,7 @@ class _StartingTwoWay(TwoWay):
         vars(self).update(vars(machine))
         self._start = start
 
-    def initial(self) -> TwoWayState:
+    def initial(self, sample: int = 0) -> TwoWayState:
         return self._start
 
 

@@ -17,7 +17,6 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.pack import LENGTH, MAGIC, Epoch, width_of
 from tenbaud.replay.record import check_epoch
-from transmitter.session.down_symbols import initial_at
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +118,7 @@ def _epoch(agreement: Agreement, number: int, first: int, hold: Vector, start: s
         if start is not None:
             state = codec.unpack(bytes.fromhex(start))
         return Epoch(number, state, hold)
-    both = initial_at(machine, first) if start is None else machine.unpack(bytes.fromhex(start))
+    both = machine.initial(first) if start is None else machine.unpack(bytes.fromhex(start))
     return Epoch(number, both.codec, hold, two_way=both)
 
 

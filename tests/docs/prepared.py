@@ -10,6 +10,7 @@ README start ordinary processes.
 from __future__ import annotations
 
 import atexit
+import ctypes
 import gc
 import importlib
 import json
@@ -31,6 +32,7 @@ LIBRARIES = (
     *("numpy", "scipy.linalg", "scipy.optimize", "scipy.signal", "control", "matplotlib.pyplot"),
     *("numba", "pydantic", "typer", "rich.table", "mcap.reader", "orjson", "zenoh"),
 )
+PR_SET_PDEATHSIG = 1
 PROGRAM = """#!{python} -IS
 import json, os, signal, socket, sys
 
@@ -132,6 +134,7 @@ def _serve(listener: socket.socket, until_end_of: int | None = None) -> None:
         connection, _ = listener.accept()
         assert len(os.listdir("/proc/self/task")) == 1, "a copy has one thread alone"
         if os.fork() == 0:
+            _end_with_parent()
             listener.close()
             _answer(connection)
         connection.close()
@@ -152,6 +155,7 @@ def _answer(connection: socket.socket) -> NoReturn:
     with suppress(OSError):  # done on both sides: whichever comes first
         os.setpgid(number, number or os.getpid())
     if number == 0:
+        _end_with_parent()
         connection.close()
         _begin(json.loads(data), streams)
     for stream in streams:
@@ -166,6 +170,11 @@ def _answer(connection: socket.socket) -> NoReturn:
     with suppress(OSError):
         connection.send(str(os.waitstatus_to_exitcode(status)).encode())
     os._exit(0)
+
+
+def _end_with_parent() -> None:
+    """Let the system kill this process when its parent ends: Ctrl-C ends all of a terminal at once."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _begin(request: dict[str, Any], streams: list[int]) -> NoReturn:

@@ -14,7 +14,7 @@ from statistics import median
 from typing import NamedTuple
 
 from channel.codec.codec import ERASED, CodecState, Vector
-from channel.codec.downlink.machine import TwoWay, TwoWayState
+from channel.codec.downlink.machine import TwoWay
 from channel.codec.lead import FlownSample
 from channel.protocol.events import ASKED
 from channel.protocol.frames import DownSymbol, Frame, Welcome, Why
@@ -97,7 +97,7 @@ class NarrowFollowing:
     def restart(self, welcome: Welcome, held_ticks: int) -> None:
         machine, terms, recorder = self.machine, self._parts.terms, self._parts.recorder
         sample = welcome.first_sample
-        state = machine.unpack(welcome.state) if welcome.state else initial_at(machine, sample)
+        state = machine.unpack(welcome.state) if welcome.state else machine.initial(sample)
         self.hypotheses.restart(state)
         self._slots.restart(sample)
         self._live = deque([None] * terms.lead_ticks)
@@ -253,9 +253,3 @@ class NarrowFollowing:
             done.lag_samples,
             codec.about(before.codec, done.word, flown.coded[0]),
         )
-
-
-def initial_at(machine: TwoWay, sample: int) -> TwoWayState:
-    """Return the initial state, before this sample."""
-    first = machine.initial()
-    return first._replace(codec=first.codec._replace(sample=sample))

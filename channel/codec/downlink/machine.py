@@ -110,11 +110,12 @@ class TwoWay:
         self.numbers = floats + codec.ticks_per_sample * len(first.codec.model)
         """that a sample works on, a measure of its cost that is the same on every machine"""
 
-    def initial(self) -> TwoWayState:
-        """Return the common state before sample 0."""
+    def initial(self, sample: int = 0) -> TwoWayState:
+        """Return the common state of a flight that begins with this sample."""
         command = self.initial_command
         known = (command,) * self.lead_ticks
-        return TwoWayState(self.codec.initial(), known, command, self.scheme.initial())
+        codec = self.codec.initial()._replace(sample=sample)
+        return TwoWayState(codec, known, command, self.scheme.initial())
 
     def commands_in(self, state: TwoWayState) -> int:
         """Return how many of the next sample's symbols are command symbols."""

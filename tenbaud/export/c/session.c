@@ -80,7 +80,7 @@ void session_command(const node *own, uint32_t tick, double *command) {
 }
 
 bool session_is_due(const node *own, uint32_t tick) {
-    return tick >= own->due_from_tick && tick < own->due_end && own->due_end - tick <= NODE_COMMANDS;
+    return tick >= own->due_from_tick && tick < own->due_end && own->commands_end - tick <= NODE_COMMANDS;
 }
 
 uint32_t session_owed_ticks(const node *own, uint32_t tick) {
@@ -182,7 +182,7 @@ static bool read_start(const node *own, wire_fields *fields, codec_state *state,
     const uint32_t inputs = wire_number(fields, 1);
     const uint32_t latest = sample_now(own) + REACH_SAMPLES + LEAD_SAMPLES;
     if (first > (own->phase == NODE_GREETING ? TERMS_SAMPLE_MAX / 3 * 2 : latest)) return false;
-    if (inputs != 0 && inputs != CODEC_INPUTS) return false;
+    if (first > TERMS_SAMPLE_MAX || (inputs != 0 && inputs != CODEC_INPUTS)) return false;
     memcpy(hold, initial_command, sizeof initial_command);
     for (uint32_t input = 0; input < inputs; input++) {
         const int16_t steps = (int16_t)wire_number(fields, 2);

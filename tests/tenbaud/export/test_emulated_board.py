@@ -20,7 +20,7 @@ import pytest
 from tests.tenbaud.ends import Relay
 from tests.tenbaud.export.compiled_codec import need
 from tests.tenbaud.export.test_node import PRESET, check_equal
-from tests.tenbaud.processes import finish, run, start
+from tests.tenbaud.processes import REPOSITORY, finish, run, start
 
 ARM_FLAGS = (
     *("-std=c99", "-mcpu=cortex-m3", "-mthumb", "-O2", "-Wall", "-Werror", "-ffp-contract=off"),
@@ -204,3 +204,17 @@ def test_a_board_without_room_is_refused_by_the_linker(
     compiled = compiled_image(board)
     assert compiled.returncode != 0
     assert "no room" in compiled.stderr or "overflowed" in compiled.stderr
+
+
+def test_the_project_for_a_nucleo_compiles(image: Path, tmp_path: Path) -> None:
+    need("make", "make")
+    project = REPOSITORY / "examples/firmware/tenbaud_nucleo/Makefile"
+    made = subprocess.run(
+        ["make", "-f", str(project), f"NODE={image.parent}"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert made.returncode == 0, made.stderr
+    assert 0 < (tmp_path / "node.bin").stat().st_size < FLASH_BYTES_MAX

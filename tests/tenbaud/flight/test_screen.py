@@ -58,17 +58,20 @@ def test_it_says_all_that_matters() -> None:
 
 def test_a_narrow_flight_says_what_is_certain_and_where_the_law_runs() -> None:
     narrow = {
-        "confirmed_to": 480, "unconfirmed": 7, "copies": 3, "rest": 2e-6, "hash_symbols": 840,
-        "down_baud": 19.98, "law_beside_plant": True,
+        "scheme": "mirrored", "confirmed_to": 391, "unconfirmed": 7, "copies": 3, "rest": 5.07e-7,
+        "hash_bits_per_sample": 1.74, "baud": 19.98,
     }  # fmt: skip
+    status = {**STATUS, "digest_checks": 0, "narrow": narrow}
     screen = Screen()
-    screen.update({**STATUS, **narrow})
+    screen.update(status)
     text = drawn(screen, color_system=None)
-    assert "certain before sample 480, 7 behind, 840 hash bits; 3 copies, rest 2e-06" in text
-    assert "19.98 symbols/s down" in text
-    assert "beside the plant too" in text
-    line = status_line({**STATUS, **narrow})
-    assert "unconfirmed 7  copies 3  rest 2e-06  down 20.0/s  law beside the plant" in line
+    assert "certain before sample 391, 7 behind; 3 copies, rest 5e-07, 1 rejoins" in text
+    assert "unseen for n samples with 2^(-1.7 n)" in text
+    assert "digests" not in text
+    assert "19.98 symbols/s; the law runs beside the plant too" in text
+    assert status_line(status).endswith(
+        "unconfirmed 7  copies 3  rest 5e-07  down 20.0/s  law beside the plant"
+    )
 
 
 def test_bits_have_the_colour_of_the_output_that_they_were_about() -> None:

@@ -38,5 +38,9 @@ static void halt(void) {
     for (;;) continue;
 }
 
-__attribute__((section(".vectors"), used)) static const void *const vectors[16] = {
-    stack_top, reset, halt, halt, halt, halt, halt, 0, 0, 0, 0, halt, halt, 0, halt, halt};
+/* A board that uses interrupts has a function of this name. */
+__attribute__((weak, alias("halt"))) void interrupt(void);
+
+__attribute__((section(".vectors"), used)) static const void *const vectors[16 + 96] = {
+    stack_top, reset, halt, halt, halt, halt, halt, 0, 0, 0, 0, halt, halt, 0, halt, halt,
+    [16 ... 111] = interrupt};

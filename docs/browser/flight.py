@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 from channel.codec.codec import Codec, CodecState
 from channel.line.impairments import ImpairedLine, impair, parse_impairments
@@ -170,15 +170,18 @@ class BrowserFlight:
         self._run, self._receiver = ends.run, ends.receiver
         self._symbols, self._taps, self._node = ends.symbols, ends.taps, ends.run.node
         self._asked = ByPage(parts.steering)
-        self._agreement: Any = SimpleNamespace(
-            config=KnownConfig(parts.values),
-            codec=parts.codec,
-            terms=parts.terms,
-            signals=parts.terms.signals,
-            clock="virtual",
-            live=True,
-            flight_ticks=parts.flight_ticks,
-            two_way=None,
+        self._agreement = cast(
+            Any,
+            SimpleNamespace(
+                config=KnownConfig(parts.values),
+                codec=parts.codec,
+                terms=parts.terms,
+                signals=parts.terms.signals,
+                clock="virtual",
+                live=True,
+                flight_ticks=parts.flight_ticks,
+                two_way=None,
+            ),
         )
         run: Any = SimpleNamespace(agreement=self._agreement, node=self._node, endpoint=ends.run)
         live: Any = self._asked

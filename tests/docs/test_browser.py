@@ -93,6 +93,10 @@ def test_a_flight_in_the_browser_breaks_recovers_and_is_replayed_with_the_same_s
         path = tmp_path / "flight.symbols"
         download.value.save_as(path)
         digests = {int(sample): pair for sample, pair in one.evaluate("digests").items()}
+        one.click("#again")
+        one.get_by_text("0, 0", exact=True).wait_for()
+        state_is(one, "lockstep", 60.0)
+        assert one.input_value("#loss") == "0"
     assert [url for url in asked if not url.startswith((top, "blob:"))] == []
     result = CliRunner().invoke(app, ["replay", str(path)])
     assert result.exit_code == 0, result.output

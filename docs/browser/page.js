@@ -6,7 +6,7 @@ import { show } from "./view/show.js";
 const worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
 const at = (id) => document.getElementById(id);
 const send = (kind, more = {}) => worker.postMessage({ kind, ...more });
-let loading = "Loading Python for the browser, 13 MB the first time.", failed = "";
+let loading = "Loading Python for the browser, 14 MB the first time.", failed = "";
 
 function listen(heard, connected) {
   worker.onerror = ({ message }) => { failed = message || "the worker could not be started"; connected(false); };

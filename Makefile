@@ -14,7 +14,7 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak docs reference chromium emulators screenshots clean
+.PHONY: help demo test check bench soak docs reference pyodide chromium emulators screenshots clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
@@ -26,7 +26,7 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 # Most tests wait for their processes half of the time: five at once keep two cores busy. What is said
 # about the times of a flight comes after them, two at once; what needs both cores sees to it itself.
 # The project's own rules are part of `make check`.
-test: chromium emulators $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
+test: chromium emulators pyodide $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
 	$(BIN)/python -m pytest -n 5 -m "not soak and not real_time" --ignore tests/rules
 	$(BIN)/python -m pytest -n 2 -m "not soak and real_time" $$(grep -rl --include='test_*.py' real_time tests)
 
@@ -64,15 +64,27 @@ screenshots: $(DEVELOP) ## fly with the live page, and make its pictures in docs
 	$(BIN)/python -m benchmarks.screenshots
 
 # Material for MkDocs advertises its successor at every start; nothing else is silenced.
-docs: reference ## build the documentation into site/, strictly
+docs: reference pyodide ## build the documentation into site/, strictly
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "written to site/; read it: $(BIN)/python -m http.server --directory site --bind 127.0.0.1"
+
+# Python for the page on which both ends fly in the browser: 14 MB by npm, versions and digests in its lock.
+PYODIDE := .cache/pyodide
+
+pyodide: ## get Pyodide for the flight in the browser, if npm is here
+	@command -v npm >/dev/null 2>&1 && \
+		mkdir -p $(PYODIDE) && cp docs/browser/package.json docs/browser/package-lock.json $(PYODIDE) && \
+		{ test -f $(PYODIDE)/node_modules/pyodide/pyodide.asm.wasm && \
+		cmp -s $(PYODIDE)/package-lock.json $(PYODIDE)/.installed || \
+		npm ci --prefix $(PYODIDE) --ignore-scripts --no-audit --no-fund --silent && \
+		cp $(PYODIDE)/package-lock.json $(PYODIDE)/.installed; } || \
+		echo "npm could not get Pyodide: the flight in the browser is left out, and its test will skip" >&2
 
 reference: $(DEVELOP) ## write the pages in docs/reference that follow from the code
 	$(BIN)/python docs/tools/reference.py
 
 clean: ## remove the environment and everything that was generated
-	rm -rf $(VENV) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PYODIDE) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The environment is brought up to date whenever pyproject.toml changes. Without --no-compile pip

@@ -20,6 +20,7 @@ from benchmarks.flights import (
     real_figures,
     virtual_figures,
 )
+from benchmarks.in_browser import in_browser_figures
 from benchmarks.latency import latency_figures
 from benchmarks.load import load_figures
 from benchmarks.logs import log_figures
@@ -39,6 +40,7 @@ BENCHMARKS: dict[str, Callable[[], Iterable[Figure]]] = {
     "load": load_figures,
     "logs": log_figures,
     "page": page_figures,
+    "in_browser": in_browser_figures,
     "recordings": recording_figures,
     "studies": studies_figures,
 }

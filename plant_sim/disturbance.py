@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Final, Protocol, TypeAlias, runtime_checkable
 
-import numpy as np
-from numpy.random import PCG64, Generator, SeedSequence
+if TYPE_CHECKING:
+    # Loaded where torques are drawn: a plant without them flies on bare Python.
+    import numpy as np
 
 GRAMMAR: Final = (
     "comma-separated q=DENSITY (rad^2/s^3, at most once) and step=TORQUE@START[..END] "
@@ -50,6 +51,8 @@ class PlannedDisturbance(Disturbance, Protocol):
 
 def pushes_of(disturbances: Sequence[Disturbance | None], steps: int) -> Pushes:
     """Return the disturbance of the first steps, a column per place; one row without any."""
+    import numpy as np
+
     planned = [one.torques(steps) for one in disturbances if isinstance(one, PlannedDisturbance)]
     return np.column_stack(planned) if planned else np.zeros((1, len(disturbances)))
 
@@ -93,10 +96,14 @@ class WhiteTorque:
         return self._block[offset]
 
     def torques(self, steps: int) -> Torques:
+        import numpy as np
+
         blocks = range(-(-steps // _BLOCK_STEPS))
         return np.concatenate([np.empty(0), *(self._draw(index) for index in blocks)])[:steps]
 
     def _draw(self, block_index: int) -> Torques:
+        from numpy.random import PCG64, Generator, SeedSequence
+
         sequence = SeedSequence(self._seed, spawn_key=(block_index, *self._key))
         return Generator(PCG64(sequence)).standard_normal(_BLOCK_STEPS) * self._deviation
 
@@ -132,6 +139,8 @@ class StepTorque:
         return self._torque_rad_s2
 
     def torques(self, steps: int) -> Torques:
+        import numpy as np
+
         torques = np.zeros(steps)
         torques[self._start_step : self._end_step] = self._torque_rad_s2
         return torques
@@ -153,6 +162,8 @@ class Sum:
         return total
 
     def torques(self, steps: int) -> Torques:
+        import numpy as np
+
         total = np.zeros(steps)
         for part in self._parts:
             total += part.torques(steps)

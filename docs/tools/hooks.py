@@ -4,6 +4,7 @@ The pages are read in two places, on the site and in the repository. They are wr
 repository (relative links, `$...$` for equations) and this makes them right on the site:
 
 * an equation becomes MathML while the site is built, which browsers draw by themselves;
+* the page on which both ends fly in the browser is added (`docs/tools/browser.py`);
 * a link to a file outside docs/, such as `../CONTRIBUTING.md`, takes that file along: Markdown as a
   page of its own below `project/`, anything else as a plain file below `source/`.
 """
@@ -18,8 +19,10 @@ from pathlib import Path
 
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
+from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
+
+from docs.tools.browser import page_files
 
 TOP = Path(__file__).resolve().parents[2]
 
@@ -32,7 +35,9 @@ FENCE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the files outside docs/ that its pages link to, and those that these link to."""
+    """Add the flight in the browser, the files outside docs/ that pages link to, and theirs."""
+    for uri, data in page_files().items():
+        files.append(File.generated(config, uri, content=data, inclusion=InclusionLevel.INCLUDED))
     waiting = [
         (_place_of(file.src_uri), Path(file.abs_src_path or "").read_text(encoding="utf-8"))
         for file in files.documentation_pages()

@@ -12,7 +12,8 @@ from channel.codec.codec import Alphabet
 from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
 from tenbaud.replay.expected import Expected
-from tenbaud.replay.record import Epoch, FlightRecord
+from tenbaud.replay.pack import Epoch
+from tenbaud.replay.record import FlightRecord
 from tenbaud.replay.refly import Reflown
 from tenbaud.replay.rows import EndRows, Topic
 

@@ -10,7 +10,7 @@ from channel.codec.downlink.machine import TwoWayState
 from receiver.session.rejoin import carried_to
 from tenbaud.audit.base import Evidence, claim
 from tenbaud.replay.control import RecordedCommands
-from tenbaud.replay.record import Epoch
+from tenbaud.replay.pack import Epoch
 from tenbaud.replay.refly import Reflown, refly
 
 JITTERED_FLIGHTS = 2

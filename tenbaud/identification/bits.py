@@ -23,7 +23,8 @@ from tenbaud.identification.linearised import Linearised, linearised, start_valu
 from tenbaud.identification.run import Identified
 from tenbaud.identification.statements import Statement, statements_of
 from tenbaud.identification.structure import choose
-from tenbaud.replay.record import Epoch, FlightRecord, epochs_of, load_record
+from tenbaud.replay.pack import Epoch
+from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 
 SKIPPED_MAX = 1_000_000
 """samples between two epochs; each of them is computed"""

@@ -12,6 +12,7 @@ from tenbaud.build.codec import build_model
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.references import References, build_references
 from tenbaud.config.schema import FlightConfig
+from tenbaud.replay.pack import add_step
 from tenbaud.replay.record import FlightRecord
 
 
@@ -62,17 +63,9 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
     reference = _references(record.agreement.config)[0]
     if reference is None:
         return ()
-    rows = record.rows["receiver"].topics["tick"]
-    told = [(row.tick, row.reference[0]) for row in rows if row.reference[0] is not None]
-    first = next(
-        (index for index, (tick, angle) in enumerate(told) if angle != reference.value(tick)), None
-    )
-    if first is None:
-        return ()
     steps: list[tuple[int, float]] = []
-    for tick, angle in told[first:]:
-        if not steps or steps[-1][1] != angle:
-            steps.append((tick, angle))
+    for row in record.rows["receiver"].topics["tick"]:
+        add_step(steps, row.tick, row.reference[0], reference)
     return tuple(steps)
 
 

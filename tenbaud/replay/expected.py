@@ -17,7 +17,7 @@ from channel.codec.lead import FlownSample
 from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
 from tenbaud.recording.memory import MemoryRecorder
-from tenbaud.replay.record import Epoch
+from tenbaud.replay.pack import Epoch
 from tenbaud.replay.refly import Reflown
 from tenbaud.replay.rows import KINDS
 from transmitter.session.copies import Confirmed, Copies

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from channel.codec.codec import CodecState, Vector, Word
-from channel.codec.downlink.machine import TwoWay, TwoWayState
+from channel.codec.codec import CodecState
+from channel.codec.downlink.machine import TwoWay
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
@@ -17,24 +17,11 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.recorded import ENDS
 from tenbaud.recording.run import Run
+from tenbaud.replay.pack import Epoch
 from tenbaud.replay.rows import EndRows, read_rows
 
 NUMBER_MAX = 1e9
 """Of a state or a command, in rad, rad/s or V."""
-
-
-@dataclass(slots=True)
-class Epoch:
-    """A stretch of samples that begins from a common state, and the words consumed in it."""
-
-    number: int
-    start: CodecState
-    hold: Vector
-    words: list[Word] = field(default_factory=list)
-    two_way: TwoWayState | None = None
-    """of a narrow downlink: X that it starts from"""
-    symbols: list[tuple[int, ...]] = field(default_factory=list)
-    """of a narrow downlink: those sent down in each sample"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from receiver.session.session import ReceiverSession
 from tenbaud.build.downlink import with_codec
 from tenbaud.build.flight import Agreement
 from tenbaud.recording.memory import MemoryRecorder
-from tenbaud.replay.record import Epoch
+from tenbaud.replay.pack import Epoch
 
 Delay = Callable[[int], int]
 """slot -> how long after its due time the symbol comes, in ns, from 0 to the deadline allowance"""

@@ -11,11 +11,12 @@ from channel.line.line import bits_per_symbol
 from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
+from tenbaud.replay.pack import Packed, pack
 from tenbaud.replay.record import FlightRecord, epochs_of
 from tenbaud.replay.refly import Reflown
 from tenbaud.replay.rows import EndRows
 from tenbaud.replay.stepped import flown_again
-from tenbaud.replay.symbols import Packed, Unpacked, pack
+from tenbaud.replay.symbols import Unpacked
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from channel.errors import CodecDiverged
 from channel.protocol.terms import Terms
 from receiver.controllers.base import Controller
 from tenbaud.build.flight import Agreement
-from tenbaud.replay.record import Epoch
+from tenbaud.replay.pack import Epoch
 from tenbaud.replay.refly import Reflown, refly
 
 

@@ -1,15 +1,4 @@
-"""A whole flight in as many bits as were sent: its words, packed.
-
-The configuration, known to both ends in advance, is in the head of the file. What a rejoin sent
-down the link, the start states of later epochs, stands there too, and set-points given by hand.
-
-    "tenbaud symbols 1" and a line feed | head length u32 | head, JSON in zlib | symbols |
-    erasures | down
-
-A symbol takes the smallest whole number of bits that its alphabet needs, the first one the lowest
-bits; an erased word counts as the alphabet's first symbols. The erasures are one bit per word, and
-left out when there is none. With a narrow downlink its symbols follow, a bit each.
-"""
+"""Reads a symbols file, as `tenbaud.replay.pack` writes it."""
 
 from __future__ import annotations
 
@@ -20,35 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from channel.codec.codec import ERASED, Alphabet, CodecState, Vector, Word
+from channel.codec.codec import ERASED, Vector
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
-from tenbaud.replay.record import Epoch, check_epoch
-
-MAGIC = b"tenbaud symbols 1\n"
-_LENGTH = struct.Struct("<I")
-
-
-@dataclass(frozen=True, slots=True)
-class Packed:
-    """A flight as bytes, and the sizes of its parts."""
-
-    head: bytes
-    symbols: bytes
-    erasures: bytes
-    down: bytes
-    start_bytes: int
-    """of the head: start states of epochs after the first, before compression"""
-
-    @property
-    def data(self) -> bytes:
-        """The whole file."""
-        return (
-            MAGIC + _LENGTH.pack(len(self.head)) + self.head + self.symbols + self.erasures + self.down
-        )
+from tenbaud.replay.pack import LENGTH, MAGIC, Epoch, width_of
+from tenbaud.replay.record import check_epoch
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,36 +27,6 @@ class Unpacked:
     epochs: list[Epoch]
     steps: tuple[tuple[int, float], ...]
     last_digest: str
-
-
-def pack(
-    agreement: Agreement, epochs: list[Epoch], steps: tuple[tuple[int, float], ...], last_digest: str
-) -> Packed:
-    """Return the flight as bytes."""
-    codec = agreement.codec
-    starts = [_start_hex(agreement, epoch) for epoch in epochs]
-    head = {
-        "config": agreement.config.model_dump(mode="json"),
-        "clock": agreement.clock,
-        "epochs": [
-            [epoch.number, epoch.start.sample, len(epoch.words), list(epoch.hold), start]
-            for epoch, start in zip(epochs, starts, strict=True)
-        ],
-        "set_points": [list(step) for step in steps],
-        "last_digest": last_digest,
-    }
-    words = [word for epoch in epochs for word in epoch.words]
-    alphabet = codec.coder.alphabet
-    width = _width(alphabet)
-    symbols = [_digit(alphabet, word, place) for word in words for place in range(_per_word(alphabet))]
-    erased = [int(word is ERASED) for word in words]
-    return Packed(
-        zlib.compress(json.dumps(head).encode(), 9),
-        _to_bits(symbols, width),
-        _to_bits(erased, 1) if any(erased) else b"",
-        _to_bits([one for epoch in epochs for sent in epoch.symbols for one in sent], 1),
-        sum(len(start) // 2 for start in starts if start is not None),
-    )
 
 
 _DAMAGED = (
@@ -106,10 +44,10 @@ def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
     """
     try:
         data = path.read_bytes()
-        head_at = len(MAGIC) + _LENGTH.size
+        head_at = len(MAGIC) + LENGTH.size
         if not data.startswith(MAGIC):
             raise ValueError("it begins otherwise")
-        (length,) = _LENGTH.unpack_from(data, len(MAGIC))
+        (length,) = LENGTH.unpack_from(data, len(MAGIC))
         head: dict[str, Any] = json.loads(_unpacked_head(data[head_at : head_at + length]))
         config = FlightConfig.model_validate(with_current_names(head["config"], "", warn=False))
         if allow_code:
@@ -136,7 +74,7 @@ def _unpacked_head(packed: bytes) -> bytes:
 
 def _epochs(described: list[list[Any]], data: bytes, agreement: Agreement) -> list[Epoch]:
     alphabet = agreement.codec.coder.alphabet
-    count, width = _per_word(alphabet), _width(alphabet)
+    count, width = alphabet.symbols_per_word, width_of(alphabet)
     for number, first, words, hold, _ in described:
         if not all(type(one) in (int, float) and abs(one) < NUMBER_MAX for one in hold):
             raise ValueError("the held command of an epoch is no list of numbers")
@@ -182,34 +120,6 @@ def _epoch(agreement: Agreement, number: int, first: int, hold: Vector, start: s
         return Epoch(number, state, hold)
     both = machine.initial(first) if start is None else machine.unpack(bytes.fromhex(start))
     return Epoch(number, both.codec, hold, two_way=both)
-
-
-def _start_hex(agreement: Agreement, epoch: Epoch) -> str | None:
-    """Return the start state of an epoch as text, None where it is the initial one."""
-    codec, machine, sample = agreement.codec, agreement.two_way, epoch.start.sample
-    if machine is not None and epoch.two_way is not None:
-        both = epoch.two_way
-        return None if both == machine.initial(sample) else machine.pack(both).hex()
-    initial: CodecState = codec.initial()._replace(sample=sample)
-    return None if epoch.start == initial else codec.pack(epoch.start).hex()
-
-
-def _per_word(alphabet: Alphabet) -> int:
-    return alphabet.symbols_per_word
-
-
-def _width(alphabet: Alphabet) -> int:
-    return (len(alphabet.symbols) - 1).bit_length()
-
-
-def _digit(alphabet: Alphabet, word: Word, place: int) -> int:
-    return 0 if word is ERASED else alphabet.symbol_number(word[place])
-
-
-def _to_bits(values: list[int], width: int) -> bytes:
-    # By way of text: shifting a number of a million bits a million times takes minutes.
-    text = "".join(format(value, f"0{width}b") for value in reversed(values))
-    return int(text or "0", 2).to_bytes(-(-len(values) * width // 8), "little")
 
 
 def _from_bits(data: bytes, width: int, count: int) -> list[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from channel.codec.codec import Vector
 from channel.codec.coders.learning import learned_of
@@ -13,10 +13,7 @@ from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session import records as receiver
-from tenbaud.build.flight import Agreement
-from tenbaud.build.transmitter_run import TransmitterRun
-from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
-from tenbaud.telemetry.schema import SCHEMA_VERSION, named_signal
+from tenbaud.telemetry.common import SCHEMA_VERSION, named_signal
 from tenbaud.telemetry.tap import Tap
 from transmitter.session.records import (
     ESTIMATE_CHANNEL,
@@ -24,6 +21,12 @@ from transmitter.session.records import (
     SAMPLE_CHANNEL,
     TICK_CHANNEL,
 )
+
+if TYPE_CHECKING:
+    # Composing imports on bare Python: the page of the documentation does it in the browser.
+    from tenbaud.build.flight import Agreement
+    from tenbaud.build.transmitter_run import TransmitterRun
+    from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 
 POINT_PERIOD_S = 0.05
 POINTS_MAX = 16

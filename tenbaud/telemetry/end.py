@@ -19,11 +19,12 @@ from tenbaud.build.downlink import said_by_words
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import build_references
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
+from tenbaud.telemetry.command_queue import CommandQueue
 from tenbaud.telemetry.compose import Composer
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.place import SOCKET, endpoint_for
 from tenbaud.telemetry.publisher import Publisher
-from tenbaud.telemetry.tap import CommandQueue, Tap
+from tenbaud.telemetry.tap import Tap
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,7 @@ class TelemetryEnd:
         self.recorder: Recorder = self.tap or recorder
         """the recorder of the end: the tap, if there is one"""
         self.queue = CommandQueue() if steerable else None
-        self.steering = _steered(agreement)
+        self.steering = steered(agreement)
         self.pace = options.pace if agreement.clock == "virtual" else None
         self.security = None if security is None else _for_viewers(security, agreement.live)
 
@@ -152,7 +153,8 @@ class TelemetryEnd:
             sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
 
 
-def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
+def steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
+    """Return the set-points of a flight so that they can be steered; None where they cannot."""
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
     references = build_references(agreement.config, agreement.signals, agreement.codec.model)

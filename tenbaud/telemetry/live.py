@@ -26,8 +26,8 @@ from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.sentences.quantities import amount
+from tenbaud.telemetry.command_queue import CommandQueue
 from tenbaud.telemetry.schema import Command, Corrupt, Impair, Pace, Pause, SetPoint, Step
-from tenbaud.telemetry.tap import CommandQueue
 
 PAUSE_POLL_S = 0.02
 KEEP_ALIVE_S = 0.5

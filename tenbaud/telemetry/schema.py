@@ -5,16 +5,14 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model, field_validator
 
-from channel.codec.signals import Signal
 from channel.line.impairments import parse_impairments
 from channel.protocol.events import EVENT_CHANNEL, EventKind
+from tenbaud.telemetry.common import SCHEMA_VERSION
 
-SCHEMA_VERSION = 3
 SET_POINT_MAX = 1e6
 
 
@@ -29,12 +27,6 @@ class SignalName(_Message):
     unit: str = Field(description="as a person writes it; empty: none")
     low: float | None = Field(description="smallest value that makes sense; null: not known")
     high: float | None = Field(description="largest value that makes sense; null: not known")
-
-
-def named_signal(one: Signal) -> dict[str, Any]:
-    """Return a signal as the messages name it."""
-    low, high = (value if isfinite(value) else None for value in (one.low, one.high))
-    return {"name": one.name, "unit": one.unit, "low": low, "high": high}
 
 
 class PlantSignals(_Message):

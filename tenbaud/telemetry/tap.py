@@ -10,10 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from pydantic import ValidationError
-
 from channel.protocol.recording import RecordChannel, Recorder
-from tenbaud.telemetry.schema import COMMAND, Command
 
 ROWS_MAX = 8192
 TOPICS = frozenset(("tick", "estimate", "sample", "event", "hypotheses"))
@@ -48,30 +45,3 @@ class Tap:
         rows = self.rows
         # The loop may append meanwhile: what comes after this count waits for the next call.
         return [rows.popleft() for _ in range(len(rows))]
-
-
-WAITING_MAX = 64
-
-
-class CommandQueue:
-    """A bounded queue; commands that make no sense, or come while it is full, are counted and gone."""
-
-    def __init__(self) -> None:
-        self.refused = 0
-        self._waiting: deque[Command] = deque()
-
-    def offer(self, data: bytes) -> None:
-        """Take the bytes of one command; called by a thread of the network."""
-        try:
-            command = COMMAND.validate_json(data)
-        except ValidationError:
-            self.refused += 1
-            return
-        if len(self._waiting) >= WAITING_MAX:
-            self.refused += 1
-        else:
-            self._waiting.append(command)
-
-    def take(self) -> Command | None:
-        """Return the next command, None when none waits; called by the loop, at its boundaries."""
-        return self._waiting.popleft() if self._waiting else None

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import orjson
 
 from tenbaud.sentences import events
-from tenbaud.telemetry.schema import SCHEMA_VERSION
+from tenbaud.telemetry.common import SCHEMA_VERSION, is_shown
 
 POINTS_KEPT = 1200
 SAMPLES_KEPT = 160
@@ -21,18 +21,7 @@ NEWS_KEPT = 60
 SILENCE_S = 2.0
 """After this silence of the flight that is shown, another one may take its place."""
 
-TAPE_SHOWS = ("erased", "late_symbol")
-OF_TRANSMITTER = ("desync", "rejoin", "ended")
-"""Events that the receiver reports as well."""
 HEAD_WITHOUT = ("points", "samples", "events")
-
-
-def is_shown(event: dict[str, Any]) -> bool:
-    """Return whether the page lists an event: not what passes by itself or is reported twice."""
-    kind = event["kind"]
-    if kind in TAPE_SHOWS or event.get("state") == "holding":
-        return False
-    return event["role"] == "transmitter" or kind not in OF_TRANSMITTER
 
 
 class News(NamedTuple):

@@ -21,8 +21,8 @@ from tenbaud.recording.envelope import extremes
 from tenbaud.recording.run import Run
 from tenbaud.recording.signals import Source
 from tenbaud.recording.table import Series, Table
-from tenbaud.telemetry.schema import named_signal
-from tenbaud.view.board import EVENTS_KEPT, OF_TRANSMITTER, SAMPLES_KEPT, is_shown
+from tenbaud.telemetry.common import OF_TRANSMITTER, is_shown, named_signal
+from tenbaud.view.board import EVENTS_KEPT, SAMPLES_KEPT
 from tenbaud.view.samples import RATE_SPAN_S, SAMPLE_FIELDS, RecordedSamples
 
 RUNS_MAX = 4

@@ -8,16 +8,14 @@ import re
 import shutil
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urldefrag
 
 import pytest
 
+from benchmarks.in_browser import served_folder
 from tests.rules.sources import TOP
 
 pytest.importorskip("mkdocs")
@@ -140,19 +138,8 @@ def test_when_a_link_is_broken_then_the_build_fails(corrupted: str, tmp_path: Pa
 
 @pytest.fixture
 def address(site: Path) -> Iterator[str]:
-    class Quiet(SimpleHTTPRequestHandler):
-        def log_message(self, *arguments: object) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(site)))
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}"
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
+    with served_folder(site) as found:
+        yield found
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")

@@ -28,20 +28,32 @@ class Flight(ABC):
 
     def run(self, ticks: int) -> int:
         """Fly `ticks` ticks, or to the end of the rig or the safe voltage; return the tick reached."""
-        endpoint = self.endpoint
-        endpoint.begin(ticks)
+        self.begin(ticks)
+        while self.step():
+            pass
+        return self.endpoint.tick
+
+    def begin(self, ticks: int) -> None:
+        """Begin a flight of `ticks` ticks, for a caller that steps it."""
+        self.endpoint.begin(ticks)
         self._begin()
-        while (due_ns := endpoint.next_due_ns) is not None:
-            self._wait_until(due_ns)
-            if self._should_stop():
-                endpoint.node.stop()
-            messages = endpoint.begin_tick(self._now_ns())
-            if messages is None:
-                break
-            self._send(messages)
-            endpoint.end_tick()
-            self._rest()
-        return endpoint.tick
+
+    def step(self) -> bool:
+        """Fly one tick; return whether there was one, so that the flight goes on."""
+        endpoint = self.endpoint
+        due_ns = endpoint.next_due_ns
+        if due_ns is None:
+            return False
+        self._wait_until(due_ns)
+        if self._should_stop():
+            endpoint.node.stop()
+        messages = endpoint.begin_tick(self._now_ns())
+        if messages is None:
+            return False
+        self._send(messages)
+        endpoint.end_tick()
+        self._rest()
+        return True
 
     def finish(self, farewell: Callable[[], End]) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.

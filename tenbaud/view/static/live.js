@@ -5,23 +5,25 @@ import { liveBanner } from "./words.js";
 
 const SPAN_S = 30, BUSY_MS = 1500, ANSWER_MS = 10_000;
 
-export function live(news) {
-  const flight = new Flight();
-  let connected = false;
+// Board messages of the page's server; `heard` takes one, `connected` whether the server is there.
+function served(heard, connected) {
+  const address = new URL("stream", location.href);
+  address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  const socket = new WebSocket(address);
+  socket.onopen = () => connected(true);
+  socket.onmessage = (event) => heard(JSON.parse(event.data));
+  socket.onclose = () => { connected(false); setTimeout(() => served(heard, connected), 1000); };
+}
 
-  function listen() {
-    const address = new URL("stream", location.href);
-    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
-    const socket = new WebSocket(address);
-    socket.onopen = () => { connected = true; news(); };
-    socket.onmessage = (event) => { flight.take(JSON.parse(event.data)); news(); };
-    socket.onclose = () => { connected = false; news(); setTimeout(listen, 1000); };
-  }
-  listen();
+// `listen` and `banner` are those of the page's server, or of a flight that comes from elsewhere.
+export function live(news, listen = served, banner = liveBanner) {
+  const flight = new Flight();
+  let isConnected = false;
+  listen((message) => { flight.take(message); news(); }, (now) => { isConnected = now; news(); });
 
   return {
     flights: [flight],
-    banner: () => liveBanner(flight, connected),
+    banner: () => banner(flight, isConnected),
     span() {
       const to = flight.forget();
       return { from: to - SPAN_S, to, cursor: null, words: "last 30 s of flight" };

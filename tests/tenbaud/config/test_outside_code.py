@@ -23,9 +23,10 @@ from tenbaud.recording.convert import convert
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.inspect import describe_text
+from tenbaud.replay.pack import Packed
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
-from tenbaud.replay.symbols import Packed, unpack
+from tenbaud.replay.symbols import unpack
 from tests.tenbaud.processes import run as run_command
 from tests.tenbaud.replay.test_old_recordings import TWO_EPOCHS
 

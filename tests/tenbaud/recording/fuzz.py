@@ -31,9 +31,10 @@ from tenbaud.recording.figure import draw_run
 from tenbaud.recording.inspect import describe_json, describe_text
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
+from tenbaud.replay.pack import MAGIC
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay, replay_symbols
-from tenbaud.replay.symbols import MAGIC, unpack
+from tenbaud.replay.symbols import unpack
 from tests.tenbaud.recording.craft import Message, chunk, mcap_file, messages_of
 
 NAMES = ("transmitter.mcap", "receiver.mcap", "config.toml", "summary.json")

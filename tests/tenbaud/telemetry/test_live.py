@@ -16,9 +16,9 @@ from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.sentences.events import event_text
-from tenbaud.telemetry.end import _steered
+from tenbaud.telemetry.command_queue import CommandQueue
+from tenbaud.telemetry.end import steered
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
-from tenbaud.telemetry.tap import CommandQueue
 from tests.events import event_fields
 
 
@@ -51,7 +51,7 @@ def test_when_a_field_to_corrupt_is_missing_then_it_is_reported_and_the_flight_g
 def test_a_set_point_beyond_a_stop_of_the_plant_is_refused_in_words() -> None:
     config = load_config("helicopter-10baud", None, {"duration_s": 2.0})
     agreement = replace(agree(config, "virtual"), live=True)
-    steering = _steered(agreement)
+    steering = steered(agreement)
     queue, endpoint = CommandQueue(), build_receiver(agreement, None, DATAGRAM)
     for value in (0.3, 0.55):
         queue.offer(json.dumps({"kind": "set_point", "output": 1, "value": value}).encode())

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud.telemetry.command_queue import WAITING_MAX, CommandQueue
 from tenbaud.telemetry.schema import Impair, SetPoint, schema_json
-from tenbaud.telemetry.tap import WAITING_MAX, CommandQueue
 
 COMMITTED = Path(__file__).parents[3] / "docs" / "telemetry.schema.json"
 

@@ -14,7 +14,7 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak docs reference chromium emulators screenshots clean
+.PHONY: help demo test check bench soak docs reference chromium emulators pyodide bits screenshots clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
@@ -26,7 +26,7 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 # Most tests wait for their processes half of the time: five at once keep two cores busy. What is said
 # about the times of a flight comes after them, two at once; what needs both cores sees to it itself.
 # The project's own rules are part of `make check`.
-test: chromium emulators $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
+test: chromium emulators pyodide $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
 	$(BIN)/python -m pytest -n 5 -m "not soak and not real_time" --ignore tests/rules
 	$(BIN)/python -m pytest -n 2 -m "not soak and real_time" $$(grep -rl --include='test_*.py' real_time tests)
 
@@ -50,15 +50,35 @@ chromium: ## install Debian's Chromium if it is missing and this is root's machi
 		apt-get -qq update && apt-get -qq install --yes --no-install-recommends chromium; } || \
 		echo "no Chromium and no way to install it here: the tests of the page will skip" >&2
 
-# The sensor node in C is compiled for this machine and for a Cortex-M3 that QEMU emulates.
-BOARD_PACKAGES := gcc gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+# The sensor node in C is compiled for this machine and for a Cortex-M3 that QEMU emulates, and the bits of the
+# codec are compared with those of other processors: a minute and 1.1 GB, nearly all of it the compilers.
+EMULATORS := gcc arm-none-eabi-gcc qemu-system-arm aarch64-linux-gnu-gcc qemu-aarch64
+EMULATOR_PACKAGES := gcc gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm \
+	gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user
 
-emulators: ## install Debian's compilers and QEMU if they are missing and this is root's machine to change
-	@command -v gcc >/dev/null 2>&1 && command -v arm-none-eabi-gcc >/dev/null 2>&1 && \
-		command -v qemu-system-arm >/dev/null 2>&1 || { \
+emulators: .cache/aarch64 ## install Debian's compilers and QEMU if they are missing and this is root's machine to change
+	@for one in $(EMULATORS); do command -v $$one >/dev/null 2>&1 || missing=$$one; done; test -z "$$missing" || { \
 		test "$$(id -u)" = 0 && command -v apt-get >/dev/null 2>&1 && \
-		apt-get -qq update && apt-get -qq install --yes --no-install-recommends $(BOARD_PACKAGES); } || \
-		echo "no way to install $(BOARD_PACKAGES) here: tests of the node in C will skip" >&2
+		apt-get -qq update && apt-get -qq install --yes --no-install-recommends $(EMULATOR_PACKAGES); } || \
+		echo "no way to install $(EMULATOR_PACKAGES) here: tests of the node in C will skip" >&2
+
+.cache/aarch64:
+	@mkdir -p .cache
+	@command -v apt-get >/dev/null 2>&1 && benchmarks/bits/fetch_python.sh $@ || \
+		echo "no way to fetch Debian's Python for aarch64 here: its test will skip" >&2
+
+# Python for WebAssembly, of npm. Its files stay below .cache.
+PYODIDE := 314.0.7
+
+pyodide: .cache/node_modules/pyodide ## fetch Python for WebAssembly if it is missing and there is npm
+
+.cache/node_modules/pyodide: Makefile
+	@mkdir -p .cache
+	@command -v npm >/dev/null 2>&1 && npm install --silent --prefix .cache --no-save pyodide@$(PYODIDE) && \
+		touch $@ || echo "no npm, or it failed: tests of Python in WebAssembly will skip" >&2
+
+bits: emulators pyodide $(DEVELOP) ## compare the codec's bits on every processor that this machine has or emulates
+	$(BIN)/python -m benchmarks.bits
 
 screenshots: $(DEVELOP) ## fly with the live page, and make its pictures in docs/figures
 	$(BIN)/python -m benchmarks.screenshots

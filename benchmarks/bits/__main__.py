@@ -1,6 +1,6 @@
 """Compares the bits of this machine's places, and writes the table of docs/RELIABILITY.md anew.
 
-    python -m benchmarks.bits                 about ten minutes; --quick for a look
+It takes about ten minutes; with `--quick` it is for a look.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     python -I -S benchmarks/bits/flight.py SAMPLES OTHERS
 
-It needs Python and its standard library alone: Debian's for aarch64 and Pyodide run this file. `flight.c`
-does the same, draw for draw, with the exported codec. `SAMPLES`: of the paper's codec; `OTHERS`: of each
-other one.
+It needs Python and its standard library alone: Debian's for aarch64 and Pyodide run this file.
+`flight.c` does the same, draw for draw, with the exported codec. `SAMPLES`: of the paper's codec;
+`OTHERS`: of each other one.
 """
 
 from __future__ import annotations
@@ -46,12 +46,13 @@ class Noise:
 
 
 def word_at(codec: Codec, state: CodecState, noise: Noise) -> Word:
-    """Return the word for a measurement that goes up and down, with noise; of 16 one erased, one by chance."""
+    """Return the word for a noisy triangle; of 16 words one is erased, and one is drawn."""
     phase = state.sample % 200
     level = ((phase if phase < 100 else 200 - phase) - 50) / 100.0
-    measured = []
-    for place in range(len(codec.predicted(state))):
-        measured.append((level if place == 0 else 0.0) + (noise.draw(2001) - 1000) / 50_000.0)
+    measured = [
+        (level if place == 0 else 0.0) + (noise.draw(2001) - 1000) / 50_000.0
+        for place in range(len(codec.predicted(state)))
+    ]
     kind = noise.draw(16)
     if kind == 0:
         return ERASED
@@ -99,7 +100,7 @@ class BothWays:
 
 
 def fly(flown: Any, samples: int) -> list[str]:
-    """Fly; return what the digests of all samples come to at each checkpoint, and the samples that failed."""
+    """Fly; return what the digests come to at each checkpoint, and how many samples failed."""
     noise, chain, failed, found = Noise(), 0, 0, []
     state = flown.initial(0)
     for sample in range(samples):

@@ -18,7 +18,8 @@ from tenbaud.export.values import literal
 from tests.golden.regenerate import FOLDER
 from transmitter.session.state_observer import StateObserver
 
-FLAGS = ("-std=c99", "-O2", "-Wall", "-Werror", "-ffp-contract=off", "-o", "flight")
+PROGRAM = "flight"
+FLAGS = ("-std=c99", "-O2", "-Wall", "-Werror", "-ffp-contract=off", "-o", PROGRAM)
 SOURCES = ("flight.c", "arithmetic.c", "blake2b.c")
 NUMBERS = ("sin", "cos", "exp")
 
@@ -28,13 +29,13 @@ class Target(NamedTuple):
 
     compiler: tuple[str, ...]
     run: tuple[str, ...] = ()
-    """before the name of the program"""
+    """how the program is run"""
     sources: tuple[str, ...] = ()
     """beside those of all"""
 
 
-HOST = Target(("gcc",), ("./flight",))
-AARCH64 = Target(("aarch64-linux-gnu-gcc", "-static"), ("qemu-aarch64", "./flight"))
+HOST = Target(("gcc",), (PROGRAM,))
+AARCH64 = Target(("aarch64-linux-gnu-gcc", "-static"), ("qemu-aarch64", PROGRAM))
 CORTEX_M3 = Target(
     (
         *("arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-nostdlib", "-T", "lm3s6965.ld"),
@@ -42,7 +43,7 @@ CORTEX_M3 = Target(
     ),
     (
         *("qemu-system-arm", "-M", "lm3s6965evb", "-nographic", "-monitor", "none"),
-        *("-semihosting", "-serial", "stdio", "-kernel", "flight"),
+        *("-semihosting", "-serial", "stdio", "-kernel", PROGRAM),
     ),
     ("start.c", "-lgcc"),
 )
@@ -62,7 +63,7 @@ def write_sources(name: str, codec: Codec, folder: Path) -> None:
 
 
 def no_observer(codec: Codec) -> StateObserver | None:
-    """Return an observer that sees nothing, where a codec is exported with one: this flight has all states."""
+    """Return one that sees nothing, where an exported codec has one: here all states are given."""
     model = codec.model
     outputs = len(model.measured(model.initial()))
     rows = ((0.0,) * outputs,) * model.state_size

@@ -27,6 +27,8 @@ class Amount(NamedTuple):
     """of the paper's codec"""
     others: int
     """of each other codec"""
+    in_c: tuple[str, ...] = tuple(GOLDEN_CODECS)
+    """which codecs are compiled"""
 
     def of(self, name: str) -> int:
         return self.samples if name == LONGEST else self.others
@@ -70,7 +72,7 @@ def differences(expected: Found, found: Found, amount: Amount) -> list[str]:
         at = next((at for at, (ours, theirs) in enumerate(pairs) if ours != theirs), None)
         if at is not None:
             every = amount.of(name) // CHECKPOINTS
-            lines.append(f"{name}: a digest among the samples {at * every} ... {(at + 1) * every} differs")
+            lines.append(f"{name}: a digest of {at * every} ... {(at + 1) * every} differs")
     return lines
 
 
@@ -108,25 +110,25 @@ def ran(*command: str | Path, folder: Path = TOP) -> str:
 
 
 def here(amount: Amount) -> Found:
-    return read(report(*amount))
+    return read(report(*amount[:2]))
 
 
 def on_aarch64(amount: Amount) -> Found:
     python = AARCH64_PYTHON / "usr/bin/python3"
     program = TOP / "benchmarks/bits/flight.py"
-    given = map(str, amount)
+    given = map(str, amount[:2])
     return read(ran("qemu-aarch64", "-L", AARCH64_PYTHON, python, "-I", "-S", program, *given))
 
 
 def in_webassembly(amount: Amount) -> Found:
     script = TOP / "benchmarks/bits/webassembly.mjs"
-    return read(ran("node", script, PYODIDE / "pyodide.mjs", TOP, *map(str, amount)))
+    return read(ran("node", script, PYODIDE / "pyodide.mjs", TOP, *map(str, amount[:2])))
 
 
 def compiled(amount: Amount) -> Found:
     from benchmarks.bits.compiled import compiled_report
 
-    return read(compiled_report(*amount))
+    return read(compiled_report(*amount[:2]))
 
 
 def in_c_for(target: in_c.Target) -> Callable[[Amount], Found]:
@@ -134,9 +136,9 @@ def in_c_for(target: in_c.Target) -> Callable[[Amount], Found]:
 
     def run(amount: Amount) -> Found:
         found = Found({"numerics": 0, "codec": 0}, {})
-        for name, codec in GOLDEN_CODECS.items():
+        for name in amount.in_c:
             with TemporaryDirectory() as folder:
-                in_c.write_sources(name, codec, Path(folder))
+                in_c.write_sources(name, GOLDEN_CODECS[name], Path(folder))
                 one = read(run_in_c(target, Path(folder), amount.of(name)))
             for kind, differing in one.golden.items():
                 found.golden[kind] += differing
@@ -150,7 +152,9 @@ def run_in_c(target: in_c.Target, folder: Path, samples: int) -> str:
     """Compile a folder and run the program; return what it printed."""
     sources = (*in_c.SOURCES, *target.sources)
     ran(*target.compiler, *in_c.FLAGS, f"-DSAMPLES={samples}", *sources, folder=folder)
-    return ran(*target.run, folder=folder)
+    # Windows looks for a relative program elsewhere.
+    program = str(folder / in_c.PROGRAM)
+    return ran(*[program if one == in_c.PROGRAM else one for one in target.run], folder=folder)
 
 
 MAKE = "make emulators, as root on Debian"
@@ -168,9 +172,7 @@ PLACES = {
         in_webassembly,
     ),
     "studies": Place(f"compiled for studies (numba), {platform.machine()}", (), compiled),
-    "c": Place(
-        f"C, {platform.machine()} (GCC)", (("gcc", f"{MAKE} (gcc)"),), in_c_for(in_c.HOST)
-    ),
+    "c": Place(f"C, {platform.machine()} (GCC)", (("gcc", f"{MAKE} (gcc)"),), in_c_for(in_c.HOST)),
     "c-aarch64": Place(
         "C, aarch64 (GCC, QEMU)",
         (QEMU_USER, ("aarch64-linux-gnu-gcc", f"{MAKE} (gcc-aarch64-linux-gnu)")),

@@ -69,6 +69,8 @@ def _cannot_open(url: str, error: Exception) -> str:
     plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else reason_of(error)
     text = f"{url} cannot be opened: {plain}"
     number = getattr(error, "errno", None)
+    if os.name != "posix" and "Permission" in str(error):
+        return f"{text}; another program may have it open"
     if number == 13 or "Permission" in str(error):
         return f"{text}; on Linux your user must be in the group that owns it (often dialout)"
     if number == 2 or "No such file" in str(error):

@@ -185,7 +185,8 @@ def _check_certain(evidence: Evidence) -> None:
     for place, row in evidence.each("transmitter", "hypotheses"):
         back = before is not None and row.confirmed_to < before.confirmed_to
         if (back and row.sample not in starts) or row.confirmed_to > row.sample + 1:
-            place.leak("confirmed_to", "it cannot be", f"{row.confirmed_to}")
+            since = f", after {before.confirmed_to} of sample {before.sample}" if before else ""
+            place.leak("confirmed_to", "it cannot be", f"{row.confirmed_to}{since}")
         before = row
 
 

@@ -137,6 +137,20 @@ def test_when_the_other_end_is_a_plain_program_then_presence_is_only_what_was_he
         assert until(lambda: not link.peer_present())
 
 
+def test_when_the_port_is_gone_after_a_message_then_the_message_is_there() -> None:
+    """A serial server sends a farewell and closes: its last byte and the end come together."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"socket://127.0.0.1:{server.getsockname()[1]}"
+        with SerialLink("transmitter", url, WIRE) as link:
+            peer, _ = server.accept()
+            with peer:
+                peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                peer.sendall(stuff(FRAME)[:-1])
+                assert until(lambda: link.counts.line_bytes_in == len(stuff(FRAME)) - 1)
+                peer.sendall(stuff(FRAME)[-1:])
+            assert link.receive(PATIENCE_S) == FRAME
+
+
 def test_when_a_symbol_has_waited_too_long_then_it_is_dropped(line: NoisyLine) -> None:
     with (
         SerialLink("transmitter", str(line.transmitter_port), WIRE) as transmitter,

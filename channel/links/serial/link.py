@@ -196,16 +196,19 @@ class SerialLink(Link):
             if port is None:
                 self._open_again()
                 continue
+            data, lost = b"", None
             try:
                 data = port.read(1)
                 if data:
                     data += port.read(port.in_waiting)  # type: ignore[attr-defined]
             except _PORT_ERRORS as error:
-                self._lose(port, error)
-                continue
+                lost = error
+            # The first byte may be the last one of a message, and the port gone after it.
             self.counts.line_bytes_in += len(data)
             for received in self._deframer.feed(data):
                 self._take(received)
+            if lost is not None:
+                self._lose(port, lost)
 
     def _take(self, received: Received) -> None:
         now = time.monotonic()

@@ -14,7 +14,7 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak docs reference chromium emulators pyodide bits screenshots clean
+.PHONY: help demo test check bench soak docs reference pyodide chromium emulators screenshots clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
@@ -67,16 +67,8 @@ emulators: .cache/aarch64 ## install Debian's compilers and QEMU if they are mis
 	@command -v apt-get >/dev/null 2>&1 && benchmarks/bits/fetch_python.sh $@ || \
 		echo "no way to fetch Debian's Python for aarch64 here: its test will skip" >&2
 
-# Python for WebAssembly, of npm. Its files stay below .cache.
-PYODIDE := 314.0.7
-
-pyodide: .cache/node_modules/pyodide ## fetch Python for WebAssembly if it is missing and there is npm
-
-.cache/node_modules/pyodide: Makefile
-	@mkdir -p .cache
-	@command -v npm >/dev/null 2>&1 && npm install --silent --prefix .cache --no-save pyodide@$(PYODIDE) && \
-		touch $@ || echo "no npm, or it failed: tests of Python in WebAssembly will skip" >&2
-
+# It takes about ten minutes, most of them in Python on the emulated processor.
+.PHONY: bits
 bits: emulators pyodide $(DEVELOP) ## compare the codec's bits on every processor that this machine has or emulates
 	$(BIN)/python -m benchmarks.bits
 
@@ -84,16 +76,29 @@ screenshots: $(DEVELOP) ## fly with the live page, and make its pictures in docs
 	$(BIN)/python -m benchmarks.screenshots
 
 # Material for MkDocs advertises its successor at every start; nothing else is silenced.
-docs: reference ## build the documentation into site/, strictly
+docs: reference pyodide ## build the documentation into site/, strictly
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "written to site/; read it: $(BIN)/python -m http.server --directory site --bind 127.0.0.1"
+
+# Python for the page on which both ends fly in the browser: 14 MB by npm, versions and digests in its lock.
+PYODIDE := .cache/pyodide
+
+pyodide: ## get Pyodide for the flight in the browser, if npm is here
+	@command -v npm >/dev/null 2>&1 && \
+		mkdir -p $(PYODIDE) && cp docs/browser/package.json docs/browser/package-lock.json $(PYODIDE) && \
+		{ test -f $(PYODIDE)/node_modules/pyodide/pyodide.asm.wasm && \
+		cmp -s $(PYODIDE)/package-lock.json $(PYODIDE)/.installed || \
+		npm ci --prefix $(PYODIDE) --ignore-scripts --no-audit --no-fund --silent && \
+		cp $(PYODIDE)/package-lock.json $(PYODIDE)/.installed; } || \
+		echo "npm could not get Pyodide: the flight in the browser is left out, and its test will skip" >&2
 
 reference: $(DEVELOP) ## write the pages in docs/reference that follow from the code
 	$(BIN)/python docs/tools/reference.py
 
 clean: ## remove the environment and everything that was generated
-	rm -rf $(VENV) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PYODIDE) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf .cache/aarch64
 
 # The environment is brought up to date whenever pyproject.toml changes. Without --no-compile pip
 # compiles every module of every package, most of which no flight ever imports.

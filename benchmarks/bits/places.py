@@ -16,7 +16,7 @@ from tests.golden.regenerate import GOLDEN_CODECS
 
 TOP = Path(__file__).resolve().parents[2]
 AARCH64_PYTHON = TOP / ".cache" / "aarch64"
-PYODIDE = TOP / ".cache" / "node_modules" / "pyodide"
+PYODIDE = TOP / ".cache" / "pyodide" / "node_modules" / "pyodide"
 PATIENCE_S = 7200.0
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 
 import pytest
 
@@ -26,11 +28,9 @@ with StopFlag() as stop:
 
 
 @pytest.mark.parametrize("is_posix", [True, False])
-@pytest.mark.parametrize(
-    "ask", [lifeline.interrupt_child, lambda child: lifeline.end_child(child, 20.0)]
-)
+@pytest.mark.parametrize("ask", [lifeline.interrupt_child, partial(lifeline.end_child, timeout_s=20.0)])
 def test_a_child_that_is_asked_to_end_says_farewell(
-    is_posix: bool, ask: object, monkeypatch: pytest.MonkeyPatch
+    is_posix: bool, ask: Callable[[subprocess.Popen[str]], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lifeline, "IS_POSIX", is_posix)
     monkeypatch.setenv(lifeline.VARIABLE, "1")
@@ -43,7 +43,7 @@ def test_a_child_that_is_asked_to_end_says_farewell(
     assert child.stdout is not None
     try:
         assert child.stdout.readline() == "ready\n"
-        ask(child)  # type: ignore[operator]
+        ask(child)
         assert child.stdout.read() == "farewell\n"
         assert child.wait(20.0) == 0
     finally:

@@ -13,7 +13,7 @@ from benchmarks.bits.places import PLACES, Amount, Found, Place, PlaceFailed, di
 from benchmarks.reliability import PAGE, replaced
 
 LONG, QUICK = Amount(100_000, 10_000), Amount(2_000, 200)
-HEAD = ["where", "golden vectors", "codecs flown", "samples", "that differ"]
+HEAD = ["where", "golden vectors", "codecs flown", "samples", "flights or files that differ"]
 
 
 def compared(place: Place, amount: Amount, expected: Found) -> tuple[list[str], list[str]]:

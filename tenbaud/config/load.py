@@ -158,7 +158,7 @@ def _read_preset(name: str, what: str = "preset") -> dict[str, Any]:
         near = difflib.get_close_matches(name, known, 1)
         hint = f" Did you mean {near[0]}?" if near else ""
         raise ConfigError(f"there is no {what} {name!r}.{hint} Known: {', '.join(known)}")
-    values = tomllib.loads(resource.read_text())
+    values = tomllib.loads(resource.read_text(encoding="utf-8"))
     base = values.pop("preset", None)
     return values if base is None else merged(_read_preset(base, what), values)
 

@@ -141,7 +141,10 @@ def _flush(part: Path) -> None:
 
 
 def _flush_entry(path: Path) -> None:
-    number = os.open(path, os.O_RDONLY)
+    if os.name != "posix" and path.is_dir():
+        return  # Windows opens no folders
+    # Windows flushes only what is open for writing.
+    number = os.open(path, os.O_RDONLY if os.name == "posix" else os.O_RDWR)
     try:
         os.fsync(number)
     except OSError as error:

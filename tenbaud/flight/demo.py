@@ -21,7 +21,7 @@ from tenbaud.config.load import dump_config, flattened
 from tenbaud.files.whole import write_whole
 from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.ends import run_in_memory
-from tenbaud.flight.lifeline import end_child, start_child
+from tenbaud.flight.lifeline import end_child, interrupt_child, start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
 from tenbaud.flight.report import write_up
 from tenbaud.flight.status import Status, StatusMode
@@ -221,7 +221,7 @@ class _Child:
         """Have the process end, once; one that has ended is left alone."""
         if not self._interrupted and self.process.poll() is None:
             self._interrupted = True
-            self.process.send_signal(signal.SIGINT)
+            interrupt_child(self.process)
 
     def dismiss(self) -> None:
         """Have the process end if it has no session yet: it has no other end to fly with."""

@@ -11,8 +11,10 @@ import signal
 import subprocess
 import sys
 import threading
+from _thread import interrupt_main
 from typing import Any
 
+IS_POSIX = os.name == "posix"
 VARIABLE = "TENBAUD_ENDS_WITH_STDIN"
 
 
@@ -25,19 +27,33 @@ def start_child(*arguments: str, **more: Any) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "tenbaud", *arguments],
         stdin=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
         start_new_session=True,
-        env={**os.environ, VARIABLE: "1"},
+        env={**os.environ, VARIABLE: "1", "PYTHONIOENCODING": "utf-8"},
         **more,
     )
+
+
+def interrupt_child(child: subprocess.Popen[str]) -> None:
+    """Ask a child to end as after Ctrl-C.
+
+    Windows has no signal between processes that leaves time to end: there its standard input is closed,
+    as if this process had ended.
+    """
+    if IS_POSIX:
+        child.send_signal(signal.SIGINT)
+    elif child.stdin is not None:
+        child.stdin.close()
 
 
 def end_child(child: subprocess.Popen[str], timeout_s: float) -> None:
     """End a child and wait for it: its resources, such as a port, are free then."""
     if child.poll() is None:
-        child.terminate()
-        if hasattr(signal, "SIGCONT"):
+        if IS_POSIX:
+            child.terminate()
             child.send_signal(signal.SIGCONT)  # one that was stopped would not hear the other
+        else:
+            interrupt_child(child)
     try:
         child.wait(timeout_s)
     except subprocess.TimeoutExpired:
@@ -54,4 +70,7 @@ def follow_parent() -> None:
 def _follow() -> None:
     while os.read(0, 4096):
         pass
-    os.kill(os.getpid(), signal.SIGTERM)
+    if IS_POSIX:
+        os.kill(os.getpid(), signal.SIGTERM)
+    else:  # where `os.kill` would end the process before its handler has run
+        interrupt_main(signal.SIGTERM)

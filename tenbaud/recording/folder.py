@@ -189,7 +189,7 @@ def read_small(path: Path) -> str:
     RecordingError for a symbolic link.
     """
     is_own_file(path)
-    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     with open(handle, "rb") as stream:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             raise OSError(errno.EINVAL, "it is no plain file", str(path))
@@ -215,7 +215,7 @@ def open_new_recording(path: Path) -> BinaryIO:
 
     A link is not followed: what it leads to is nobody's recording.
     """
-    flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0)
+    flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
     try:
         stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:

@@ -124,4 +124,4 @@ def plotjuggler_layout(plots: tuple[Plot, ...], recording: str) -> str:
 
 
 def _template(name: str) -> str:
-    return (files("tenbaud") / "recording" / "templates" / name).read_text()
+    return (files("tenbaud") / "recording" / "templates" / name).read_text(encoding="utf-8")

@@ -320,7 +320,7 @@ def open_recording(path: Path) -> BinaryIO:
     """Open a recording for reading. Raises RecordingError for what is missing or no plain file."""
     try:
         # Without O_NONBLOCK a pipe laid in a recording's place would be waited for.
-        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             os.close(handle)
             raise RecordingError(

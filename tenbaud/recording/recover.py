@@ -86,7 +86,7 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
                 for taken in (output, kept):
                     if taken is not None and os.path.lexists(taken):
                         raise _exists(taken)
-                os.fchmod(whole.fileno(), os.fstat(damaged.fileno()).st_mode & 0o777)
+                unfinished.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
                 os.fsync(whole.fileno())
                 if kept is not None:
                     _keep(path, kept)

@@ -19,6 +19,7 @@ from pathlib import Path
 from channel.errors import LinkError
 from channel.links.base import Role
 from channel.links.endpoints import check_endpoints, is_loopback
+from tenbaud.recording.folder import try_lock
 
 SOCKET = "unixsock-stream/"
 PATH_BYTES_MAX = 100
@@ -99,13 +100,10 @@ def _is_held(lock: Path) -> bool:
 
     It is seen in every container that has the folder, where a process number would be another's.
     """
-    import fcntl
-
     try:
-        with lock.open() as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        with lock.open("rb") as file:
+            return try_lock(file.fileno()) is not True
     except FileNotFoundError:
         return False
     except OSError:
         return True
-    return False

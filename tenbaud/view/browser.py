@@ -26,7 +26,7 @@ def open_privately() -> Iterator[Callable[[str], None]]:
 
         def show(address: str) -> None:
             file = Path(folder) / "page.html"
-            file.write_text(LEAD_ON.format(escape(address)))
+            file.write_text(LEAD_ON.format(escape(address)), encoding="utf-8")
             webbrowser.open(file.as_uri())
 
         yield show

@@ -12,7 +12,7 @@ import json
 import math
 import random
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from channel.codec import numerics
@@ -204,11 +204,11 @@ GOLDEN_CODECS: dict[str, Codec] = {
 }
 
 
-def codec_vectors() -> dict[str, list[list[object]]]:
+def codec_vectors(codecs: Mapping[str, Codec] = GOLDEN_CODECS) -> dict[str, list[list[object]]]:
     """Return [word, steps of all ticks, digest, model in hex, coder in hex] of each sample."""
     chooser = random.Random(20240614)
     vectors: dict[str, list[list[object]]] = {}
-    for name, codec in GOLDEN_CODECS.items():
+    for name, codec in codecs.items():
         state = codec.initial()
         rows: list[list[object]] = []
         for sample in range(60):

@@ -69,9 +69,12 @@ def _cannot_open(url: str, error: Exception) -> str:
     plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else reason_of(error)
     text = f"{url} cannot be opened: {plain}"
     number = getattr(error, "errno", None)
+    if os.name != "posix" and "Permission" in str(error):
+        return f"{text}; another program may have it open"
     if number == 13 or "Permission" in str(error):
         return f"{text}; on Linux your user must be in the group that owns it (often dialout)"
-    if number == 2 or "No such file" in str(error):
+    # pyserial gives the error of Windows as a text.
+    if number == 2 or "No such file" in str(error) or "FileNotFoundError" in str(error):
         return f"{text}; `tenbaud doctor` lists the ports that are there"
     if number in (11, 16) or "lock" in str(error):
         return f"{text}; another program has it open"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from pathlib import Path
 
@@ -20,6 +21,8 @@ class PseudoTerminal:
 
     def plug(self) -> None:
         """Make it; OSError, with the name of the link, where that cannot be made."""
+        if os.name != "posix":
+            raise OSError(errno.ENOTSUP, "this system has no pseudo-terminals: give tcp:HOST:PORT")
         import tty
 
         self.handle, self._other = os.openpty()

@@ -58,7 +58,11 @@ def files_to_compare(first: Path, second: Path | None = None) -> list[Comparison
     """The files that `compare_runs` would open. Ends recorded in one folder only are left out."""
     if second is None:
         run = RunFolder(first)
-        run.recordings()  # refuses links
+        found = run.recordings()  # refuses links
+        if len(found) == 1:
+            raise RecordingError(
+                f"{first} holds {found[0].name} alone. Give the folder of the other end too."
+            )
         return [Comparison(run.transmitter, run.receiver, lockstep=True)]
     if first.is_dir() != second.is_dir():
         raise RecordingError(

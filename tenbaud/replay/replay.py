@@ -23,6 +23,8 @@ from tenbaud.replay.symbols import Unpacked
 class Replayed:
     """The result of a replay."""
 
+    ends: tuple[str, ...]
+    """whose recordings were compared"""
     samples: int
     digests_compared: int
     """samples of either end whose digest was compared"""
@@ -57,6 +59,7 @@ def replay(record: FlightRecord) -> Replayed:
     erased = sum(word is None for word in words)
     bits = (len(words) - erased) * alphabet.symbols_per_word * bits_per_symbol(alphabet)
     return Replayed(
+        tuple(record.rows),
         len(flown),
         compared,
         differences,
@@ -196,10 +199,10 @@ def replay_text(replayed: Replayed) -> str:
     if replayed.steps:
         lines.append(f"the set-point was changed manually; {len(replayed.steps)} steps were recorded")
     if replayed.equal:
-        lines.append(
-            f"flown again: all {replayed.digests_compared} digests of both recordings are equal, and "
-            "so are the commands"
-        )
+        whose = "both recordings" if len(replayed.ends) > 1 else f"the {replayed.ends[0]}'s recording"
+        lines.append(f"flown again: all {replayed.digests_compared} digests of {whose} are equal")
+        if "receiver" in replayed.ends:
+            lines[-1] += ", and so are the commands"
     elif replayed.differences:
         lines += ["flown again, it is not the flight that was recorded:"]
         lines += [f"  {difference}" for difference in replayed.differences]

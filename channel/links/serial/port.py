@@ -68,6 +68,8 @@ def _cannot_open(url: str, error: Exception) -> str:
     beneath = error.__context__
     plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else reason_of(error)
     text = f"{url} cannot be opened: {plain}"
+    if isinstance(beneath, ConnectionRefusedError):
+        return f"{text}; start the device or program that listens there first"
     number = getattr(error, "errno", None)
     if os.name != "posix" and "Permission" in str(error):
         return f"{text}; another program may have it open"

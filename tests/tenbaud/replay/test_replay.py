@@ -96,6 +96,24 @@ def test_the_command_shows_the_size_and_flies_the_file_again(tmp_path: Path) -> 
     assert run_command("replay", "run", "--save", "flight.symbols", cwd=tmp_path).code == 2
 
 
+@pytest.mark.parametrize(
+    ("end", "other", "outcome"),
+    [
+        ("receiver", "transmitter", "the receiver's recording are equal, and so are the commands\n"),
+        ("transmitter", "receiver", "the transmitter's recording are equal\n"),
+    ],
+)
+def test_the_command_says_which_recordings_were_compared(
+    end: str, other: str, outcome: str, tmp_path: Path
+) -> None:
+    run = flown(tmp_path / "run")
+    samples = len(run.table(end, "sample"))
+    (run.path / f"{other}.mcap").unlink()
+    done = run_command("replay", "run", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert f"all {samples} digests of {outcome}" in done.out
+
+
 def test_a_corrupted_symbols_file_is_refused_or_found_out(tmp_path: Path) -> None:
     run = flown(tmp_path / "run")
     replayed = replay(load_record(run.path))

@@ -86,8 +86,8 @@ static void accept_peer(void) {
 
 static void put(char one) { putchar(one); }
 
-static void tell(const node *own) {
-    rig_tell(own, put);
+static void report(const node *own) {
+    rig_report(own, put);
     fflush(stdout);
 }
 
@@ -115,18 +115,18 @@ int main(int count, char **arguments) {
     const uint64_t began_ns = hardware_now_ns();
     const uint64_t end_ns = count > 2 ? began_ns + (uint64_t)(atof(arguments[2]) * 1e9) : UINT64_MAX;
     node_begin(&own, (uint32_t)(began_ns ^ began_ns >> 32) * 2654435761u ^ (uint32_t)getpid());
-    uint64_t told_ns = began_ns;
+    uint64_t reported_ns = began_ns;
     while (hardware_now_ns() < end_ns) {
         wait_for_bytes(arguments[1]);
         node_poll(&own);
-        if (hardware_now_ns() - told_ns >= 1000000000u) {
-            told_ns += 1000000000u;
-            tell(&own);
+        if (hardware_now_ns() - reported_ns >= 1000000000u) {
+            reported_ns += 1000000000u;
+            report(&own);
         }
         if (own.phase == NODE_ENDED && (own.session == 0 || own.guard.state == GUARD_LATCHED)) break;
     }
     if (own.phase == NODE_FLYING || own.phase == NODE_REJOINING) session_bye(&own, 1);
-    tell(&own);
+    report(&own);
     usleep(300000); /* the other end reads the farewell before a socket closes */
     return own.is_refused ? 3 : own.ending == 1 ? 0 : 5;
 }

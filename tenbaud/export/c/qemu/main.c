@@ -60,12 +60,12 @@ static void measure(void) {
     uint8_t probe[8];
     codec_probe(probe);
     put('{');
-    rig_tell_number("stack_bytes", deepest_stack(), put);
-    rig_tell_number("encode_ns", (uint32_t)(encode_ns / MEASURED_SAMPLES), put);
-    rig_tell_number("step_ns", (uint32_t)(step_ns / MEASURED_SAMPLES), put);
-    rig_tell_number("tick_ns", (uint32_t)(step_ns / MEASURED_SAMPLES / CODEC_TICKS_PER_SAMPLE), put);
-    rig_tell_number("digest_ns", (uint32_t)(digest_ns / MEASURED_SAMPLES), put);
-    rig_tell_number("node_bytes", sizeof(node), put);
+    rig_report_number("stack_bytes", deepest_stack(), put);
+    rig_report_number("encode_ns", (uint32_t)(encode_ns / MEASURED_SAMPLES), put);
+    rig_report_number("step_ns", (uint32_t)(step_ns / MEASURED_SAMPLES), put);
+    rig_report_number("tick_ns", (uint32_t)(step_ns / MEASURED_SAMPLES / CODEC_TICKS_PER_SAMPLE), put);
+    rig_report_number("digest_ns", (uint32_t)(digest_ns / MEASURED_SAMPLES), put);
+    rig_report_number("node_bytes", sizeof(node), put);
     put('"');
     for (const char *text = "samples\": 20}\n"; *text; text++) put(*text);
 }
@@ -82,17 +82,17 @@ int main(void) {
     measure();
     rig_begin();
     for (uint32_t start = 1;; start++) {
-        uint64_t told_ns = hardware_now_ns();
+        uint64_t reported_ns = hardware_now_ns();
         /* No source of chance: the time to here differs, and a board of yours has a serial number. */
-        node_begin(&own, (uint32_t)told_ns * 2654435761u ^ SYSTICK_VALUE ^ start << 24);
+        node_begin(&own, (uint32_t)reported_ns * 2654435761u ^ SYSTICK_VALUE ^ start << 24);
         while (own.phase != NODE_ENDED || (own.session != 0 && own.guard.state != GUARD_LATCHED)) {
             node_poll(&own);
-            if (hardware_now_ns() - told_ns >= 1000000000u) {
-                told_ns += 1000000000u;
-                rig_tell(&own, put);
+            if (hardware_now_ns() - reported_ns >= 1000000000u) {
+                reported_ns += 1000000000u;
+                rig_report(&own, put);
             }
         }
-        rig_tell(&own, put);
+        rig_report(&own, put);
         /* A stop for safety lasts until the reset; otherwise the receiver may fly again, or another one. */
         if (own.ending == ENDING_SAFETY_STOP) return 0;
         const uint64_t ended_ns = hardware_now_ns();

@@ -55,7 +55,7 @@ static void put_number(uint32_t number, void (*put)(char)) {
     while (count) put(digits[--count]);
 }
 
-void rig_tell_number(const char *name, uint32_t number, void (*put)(char)) {
+void rig_report_number(const char *name, uint32_t number, void (*put)(char)) {
     put_text("\"", put);
     put_text(name, put);
     put_text("\": ", put);
@@ -63,27 +63,27 @@ void rig_tell_number(const char *name, uint32_t number, void (*put)(char)) {
     put_text(", ", put);
 }
 
-void rig_tell(const node *own, void (*put)(char)) {
+void rig_report(const node *own, void (*put)(char)) {
     const node_counts *counts = &own->counts;
     const uint64_t digest = codec_digest(&own->confirmed);
     put('{');
-    rig_tell_number("phase", own->phase, put);
-    rig_tell_number("ending", own->ending, put);
-    rig_tell_number("refused", own->is_refused, put);
-    rig_tell_number("guard", own->guard.state, put);
-    rig_tell_number("epoch", own->epoch, put);
-    rig_tell_number("sample", own->confirmed.sample, put);
-    rig_tell_number("confirmed", counts->confirmed, put);
-    rig_tell_number("digest_checks", counts->digest_checks, put);
-    rig_tell_number("desyncs", counts->desyncs, put);
-    rig_tell_number("rejoins", counts->rejoins, put);
-    rig_tell_number("erasures", counts->erasures, put);
-    rig_tell_number("symbols", counts->symbols_sent, put);
-    rig_tell_number("ticks", counts->ticks, put);
-    rig_tell_number("ticks_missed", counts->ticks_missed, put);
-    rig_tell_number("commands_late", counts->commands_late, put);
-    rig_tell_number("out_of_bounds", counts->out_of_bounds, put);
-    rig_tell_number("stale_frames", counts->stale_frames, put);
+    rig_report_number("phase", own->phase, put);
+    rig_report_number("ending", own->ending, put);
+    rig_report_number("refused", own->is_refused, put);
+    rig_report_number("guard", own->guard.state, put);
+    rig_report_number("epoch", own->epoch, put);
+    rig_report_number("sample", own->confirmed.sample, put);
+    rig_report_number("confirmed", counts->confirmed, put);
+    rig_report_number("digest_checks", counts->digest_checks, put);
+    rig_report_number("desyncs", counts->desyncs, put);
+    rig_report_number("rejoins", counts->rejoins, put);
+    rig_report_number("erasures", counts->erasures, put);
+    rig_report_number("symbols", counts->symbols_sent, put);
+    rig_report_number("ticks", counts->ticks, put);
+    rig_report_number("ticks_missed", counts->ticks_missed, put);
+    rig_report_number("commands_late", counts->commands_late, put);
+    rig_report_number("out_of_bounds", counts->out_of_bounds, put);
+    rig_report_number("stale_frames", counts->stale_frames, put);
     put_text("\"digest\": \"", put);
     for (int shift = 60; shift >= 0; shift -= 4) put("0123456789abcdef"[digest >> shift & 15u]);
     put_text("\"}\n", put);

@@ -8,7 +8,7 @@
 void rig_begin(void);
 
 /* Writes the node's counts as a line of JSON, character by character. */
-void rig_tell(const node *own, void (*put)(char));
-void rig_tell_number(const char *name, uint32_t number, void (*put)(char));
+void rig_report(const node *own, void (*put)(char));
+void rig_report_number(const char *name, uint32_t number, void (*put)(char));
 
 #endif

@@ -1,9 +1,10 @@
-"""Ports with the names and errors of Windows, as far as they can be tested elsewhere."""
+"""Ports that cannot be opened; names and errors of Windows as far as they can be tested elsewhere."""
 
 from __future__ import annotations
 
 import errno
 import os
+import socket
 from types import SimpleNamespace
 
 import pytest
@@ -44,3 +45,10 @@ def test_an_error_of_windows_says_what_to_do(
 def test_a_com_port_that_is_not_there_is_refused_here_too() -> None:
     with pytest.raises(LinkError, match=f"COM99 cannot be opened: {os.strerror(errno.ENOENT)}"):
         port.open_port("COM99", 9600)
+
+
+def test_a_socket_without_a_listener_says_what_to_start() -> None:
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))  # bound and not listening, so that the port stays refused
+        with pytest.raises(LinkError, match="; start the device or program"):
+            port.open_port(f"socket://127.0.0.1:{bound.getsockname()[1]}", 9600)

@@ -71,6 +71,9 @@ def leave(code: int) -> None:
             # The interpreter would try again at exit, and end with its own code.
             with suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_RDWR), stream.fileno())
+    # If an interrupt passed an `exec` of text, as in the import of a dataclass, CPython ends a process
+    # by SIGINT, whatever its code. It forgets that at the next `exec`.
+    exec("")
     sys.exit(code)
 
 

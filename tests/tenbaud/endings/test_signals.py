@@ -52,6 +52,19 @@ def _stopped(ended: Ended, number: int) -> None:
     assert "Traceback" not in ended.err, ended.err
 
 
+def test_when_an_interrupt_passed_an_import_that_executes_text_then_the_code_is_the_commands(
+    tmp_path: Path,
+) -> None:
+    code = """
+from contextlib import suppress
+with suppress(KeyboardInterrupt):
+    exec("raise KeyboardInterrupt")
+from tenbaud.cli.streams import leave
+leave(130)
+"""
+    assert finish(start(cwd=tmp_path, code=code)).code == ExitCode.INTERRUPTED
+
+
 @pytest.mark.parametrize(
     ("stage", "number"),
     [

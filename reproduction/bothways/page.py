@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from reproduction.bothways.draw import ERRORS, LISTS, Points
@@ -216,6 +217,8 @@ def _table(points: list[Point], found: Points) -> list[str]:
 
 
 def _cells(one: Found) -> str:
+    if math.isinf(one.error):
+        return "diverged | | | | | | | "
     delay = f"{one.delay:.0f} / {one.delay_late:.0f}" if one.confirmed else "never"
     return (
         f"{one.error:.3f} ± {one.error_half:.3f} | {one.tracking:.3f} | {one.largest:.2f} "

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from hashlib import blake2b
 from pathlib import Path
 
+from channel.errors import CodecDiverged
 from reproduction.bothways.flights import NarrowFlight, full
 from reproduction.bothways.lines import Faults
 from reproduction.bothways.subjects import PITCH, SUBJECTS, machine_of, parts_of
@@ -77,6 +78,9 @@ class Found:
     wrong: int
     confirmed: int
 
+
+DIVERGED = Found(math.inf, 0.0, math.inf, math.inf, *[math.nan] * 3, 0.0, *[math.nan] * 3, 0, 0)
+"""Of a point in one of whose flights the estimate left all bounds, so that it ended."""
 
 OnProgress = Callable[[float, float, str], None]
 
@@ -146,7 +150,10 @@ def fly(point: Point) -> Found:
         body, trip = subject.body(seed), point.trip
         flight = NarrowFlight(machine, wanted, body, parts.targets, seed, faults, round_trip=trip)
         begin = time.process_time()
-        one = flight.fly(point.flown)
+        try:
+            one = flight.fly(point.flown)
+        except CodecDiverged:
+            return DIVERGED
         taken_s += time.process_time() - begin
         own = full(
             parts.codec,

@@ -79,7 +79,10 @@ class Found:
     confirmed: int
 
 
-DIVERGED = Found(math.inf, 0.0, math.inf, math.inf, *[math.nan] * 3, 0.0, *[math.nan] * 3, 0, 0)
+NONE = math.nan
+DIVERGED = Found(
+    math.inf, 0.0, math.inf, math.inf, NONE, NONE, NONE, 0.0, NONE, NONE, NONE, wrong=0, confirmed=0
+)
 """Of a point in one of whose flights the estimate left all bounds, so that it ended."""
 
 OnProgress = Callable[[float, float, str], None]

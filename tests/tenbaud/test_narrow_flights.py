@@ -81,6 +81,7 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
     assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.real_time
 def test_when_bytes_are_damaged_and_the_plug_is_out_then_no_wrong_state_is_confirmed(
     tmp_path: Path,
 ) -> None:
@@ -95,7 +96,7 @@ def test_when_bytes_are_damaged_and_the_plug_is_out_then_no_wrong_state_is_confi
             time.sleep(0.4)
             line.plug()
 
-        flown = fly(line, {**narrow_settings(), "duration_s": 8.0}, disturb)
+        flown = fly(line, {**narrow_settings(), "duration_s": 14.0}, disturb)
         assert line.damaged["down"] > 0
     # On a busy machine fewer samples are confirmed than a flight needs to be called flown.
     assert flown.outcome.code in (ExitCode.OK, ExitCode.NOT_FLOWN), flown.outcome.text

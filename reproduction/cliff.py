@@ -10,27 +10,21 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
-from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
+from reproduction.studies.kept import Kept, OnProgress
 from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import rate_needed
 from tenbaud.config.load import ConfigError, load_config, merged_values
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
 from tenbaud.design.described import plant_of
-from tenbaud.files.whole import write_whole
-from tenbaud.studies.compiled import sources_digest
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.schedule import Uncommon
 
-WORKERS = 2
 TICK_S = 0.004
 """longest tick"""
 FALLEN_RAD = 1.0
@@ -90,9 +84,6 @@ class Found:
     """half the width of the mean's 95 % interval"""
     refused: str = ""
     """why nothing was flown: no coder can hold the plant at this rate"""
-
-
-OnProgress = Callable[[float, float, str], None]
 
 
 @cache
@@ -186,38 +177,6 @@ def fly(point: Point) -> Found:
 
 def fly_all(points: list[Point], path: Path, on_progress: OnProgress) -> dict[Point, Found]:
     """Fly what the file does not hold yet, and keep each point in it as it comes."""
-    kept = _kept(path)
-    found = {point: kept[point] for point in points if point in kept}
-    left = [point for point in points if point not in found]
-    context = multiprocessing.get_context("spawn")
-    on_progress(len(found), len(points), "flights")
-    with ProcessPoolExecutor(min(WORKERS, max(1, len(left))), context) as pool:
-        flying = {pool.submit(fly, point): point for point in left}
-        for future in as_completed(flying):
-            found[flying[future]] = future.result()
-            _keep(path, {**kept, **found})
-            on_progress(len(found), len(points), "flights")
-    return {point: found[point] for point in points}
-
-
-def _kept(path: Path) -> dict[Point, Found]:
-    """Return what a file holds; nothing where other sources made it, or where it is damaged."""
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-        if values["sources"] != _sources():
-            return {}
-        return {Point(**one["point"]): Found(**one["found"]) for one in values["points"]}
-    except (FileNotFoundError, ValueError, TypeError, KeyError):
-        return {}
-
-
-def _keep(path: Path, found: dict[Point, Found]) -> None:
-    points = [{"point": asdict(point), "found": asdict(one)} for point, one in found.items()]
-    write_whole(path, json.dumps({"sources": _sources(), "points": points}, indent=1) + "\n")
-
-
-def _sources() -> str:
-    """Return what stands for the sources and the presets that the figures rest on."""
     presets = [merged_values(plant.preset, None) for plant in PLANTS.values()]
     own = json.dumps(presets, sort_keys=True).encode() + Path(__file__).read_bytes()
-    return f"{sources_digest()} {blake2b(own, digest_size=8).hexdigest()}"
+    return Kept(path, Point, Found, own).fly_all(fly, points, on_progress)

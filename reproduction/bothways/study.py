@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
-import multiprocessing
 import statistics
 import time
-from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
-from hashlib import blake2b
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from channel.errors import CodecDiverged
 from reproduction.bothways.flights import NarrowFlight, full
 from reproduction.bothways.lines import Faults
 from reproduction.bothways.subjects import PITCH, SUBJECTS, machine_of, parts_of
-from tenbaud.files.whole import write_whole
-from tenbaud.studies.compiled import sources_digest
+from reproduction.studies.kept import Kept, OnProgress
 
-WORKERS = 2
 FIRST_SEED = 2001
 """None of those that were looked at while the layouts and the numbers of the list were chosen: 1 to 4,
 11 to 28 and 101 to 130."""
@@ -84,8 +78,6 @@ DIVERGED = Found(
     math.inf, 0.0, math.inf, math.inf, NONE, NONE, NONE, 0.0, NONE, NONE, NONE, wrong=0, confirmed=0
 )
 """Of a point in one of whose flights the estimate left all bounds, so that it ended."""
-
-OnProgress = Callable[[float, float, str], None]
 
 
 def symbols_of(point: Point) -> int:
@@ -217,41 +209,8 @@ def corruptions(at_receiver: bool, count: int) -> tuple[float, int]:
 
 def fly_all(points: Iterable[Point], path: Path, on_progress: OnProgress) -> dict[Point, Found]:
     """Fly what the file does not hold yet, and keep each point in it as it comes."""
-    points = list(dict.fromkeys(points))
-    kept = _kept(path)
-    found = {point: kept[point] for point in points if point in kept}
-    left = [point for point in points if point not in found]
-    context = multiprocessing.get_context("spawn")
-    on_progress(len(found), len(points), "flights")
-    with ProcessPoolExecutor(min(WORKERS, max(1, len(left))), context) as pool:
-        flying = {pool.submit(fly, point): point for point in left}
-        for future in as_completed(flying):
-            found[flying[future]] = future.result()
-            _keep(path, {**kept, **found})
-            on_progress(len(found), len(points), "flights")
-    return {point: found[point] for point in points}
-
-
-def _kept(path: Path) -> dict[Point, Found]:
-    """Return what a file holds; nothing where other sources made it, or where it is damaged."""
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-        if values["sources"] != _sources():
-            return {}
-        return {Point(**one["point"]): Found(**one["found"]) for one in values["points"]}
-    except (FileNotFoundError, ValueError, TypeError, KeyError):
-        return {}
-
-
-def _keep(path: Path, found: dict[Point, Found]) -> None:
-    points = [{"point": asdict(point), "found": asdict(one)} for point, one in found.items()]
-    write_whole(path, json.dumps({"sources": _sources(), "points": points}, indent=1) + "\n")
-
-
-def _sources() -> str:
-    """Return what stands for the sources that the figures rest on."""
     own = b"".join(
         (Path(__file__).parent / name).read_bytes()
         for name in ("flights.py", "lines.py", "study.py", "subjects.py")
     )
-    return f"{sources_digest()} {blake2b(own, digest_size=8).hexdigest()}"
+    return Kept(path, Point, Found, own).fly_all(fly, points, on_progress)

@@ -10,7 +10,7 @@ from types import FunctionType
 from typing import Any
 
 from channel.codec.numerics import refuse
-from tenbaud.export.expressions import Expressions
+from tenbaud.export.expressions import POWER, Expressions
 from tenbaud.export.scope import Callee
 from tenbaud.export.source import source_of
 from tenbaud.export.values import (
@@ -27,13 +27,17 @@ from tenbaud.export.values import (
     Value,
 )
 
-REFUSED = {
+DIFFERING: dict[Any, str] = {
     builtins.sum: "its rounding changed in Python 3.12: write the additions out",
     builtins.min: "write the comparison out, so that ties, zeros and NaN are decided in sight",
     builtins.max: "write the comparison out, so that ties, zeros and NaN are decided in sight",
     builtins.abs: "write the comparison out, so that the sign of zero is decided in sight",
     builtins.round: "use math.floor(x + 0.5), which has one reading",
-    builtins.pow: "x**2 is not x*x on every C library: multiply",
+    builtins.pow: POWER,
+}
+"""Functions whose results differ between machines or are not plain in the text."""
+REFUSED: dict[Any, str] = {
+    **DIFFERING,
     builtins.range: "only `for` goes over a range",
     builtins.enumerate: "go over range(len(...)) instead",
 }

@@ -44,8 +44,9 @@ COMPARISONS: dict[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.NotEq: ("!=", operator.ne),
 }
 WHOLE_ONLY = ("//", "%", "&", "|", "^", "<<", ">>")
+POWER = "x**2 is not x*x on every C library: multiply"
 REFUSED = {
-    ast.Pow: "x**2 is not x*x on every C library: multiply",
+    ast.Pow: POWER,
     ast.MatMult: "@: write the products out, their order is part of the result",
 }
 

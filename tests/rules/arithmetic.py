@@ -10,17 +10,15 @@ from __future__ import annotations
 
 import ast
 
+from tenbaud.export.calls import DIFFERING
+from tenbaud.export.expressions import POWER
+
 INTEGERS = "# integers"
 """A line with this comment may use ``//``, ``%`` and ``divmod()``: no float can be there."""
 
 MATH_ALLOWED = {"sqrt", "floor", "isfinite"}
 CALLS_REFUSED = {
-    "sum": "its rounding changed in Python 3.12: write the additions out",
-    "min": "write the comparison out, so that ties, zeros and NaN are decided in sight",
-    "max": "write the comparison out, so that ties, zeros and NaN are decided in sight",
-    "abs": "write the comparison out, so that the sign of zero is decided in sight",
-    "round": "use math.floor(x + 0.5), which has one reading",
-    "pow": "x**2 is not x*x on every C library: multiply",
+    **{function.__name__: why for function, why in DIFFERING.items()},
     "hash": "differs from process to process",
     "id": "differs from process to process",
 }
@@ -37,7 +35,6 @@ IMPORTS_REFUSED = {
     "os": "the machine is not an input of the codec",
     "platform": "the machine is not an input of the codec",
 }
-POWER = "x**2 is not x*x on every C library: multiply"
 UNORDERED = "the order of a set or dict is not part of the state: iterate over a tuple"
 
 

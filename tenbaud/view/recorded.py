@@ -246,19 +246,23 @@ class RecordedFlight:
         last = last[~np.isnan(last)]
         return {"p99_ms": float(np.percentile(last, 99.0))} if len(last) else None
 
+    @cached_property
+    def _shared(self) -> dict[str, Any]:
+        shared: dict[str, Any] = json.loads(self.run.metadata["shared_config"])
+        return shared
+
     def _narrow_at(self, sample: int) -> dict[str, Any] | None:
         """Return what the transmitter knew of the receiver's state once it had heard of a sample."""
         row = _row_of(self._listed, sample)
         if self._listed is None or row is None:
             return None
         names = {"confirmed_to": int, "size": int, "rest": float}
-        shared = json.loads(self.run.metadata["shared_config"])
         return {name: of(self._listed[name][row]) for name, of in names.items()} | {
             "sample": sample,
             "hash_symbols": None,
             "baud_measured": self._down_rate_at(sample),
-            "baud_configured": shared["channel"]["downlink_baud"],
-            "is_mirrored": shared["downlink"]["scheme"] == "mirrored",
+            "baud_configured": self._shared["channel"]["downlink_baud"],
+            "is_mirrored": self._shared["downlink"]["scheme"] == "mirrored",
         }
 
     def _down_rate_at(self, sample: int) -> float | None:

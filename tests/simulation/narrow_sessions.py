@@ -26,7 +26,7 @@ CLEAN = Faults()
 
 
 class Announced:
-    """A programme of set-points whose command nobody asks for."""
+    """A programme of set-points; its command is never asked for."""
 
     def command(self, tick: int, state: Vector) -> Vector:
         raise AssertionError("a mirrored law decides the command")
@@ -159,11 +159,10 @@ class TimedFlight(NarrowFlight):
             if tick == first:
                 self._send()
             assert self.hypotheses.rejoin is None
-            # The guard clamps: a weighted mean may be beyond its terms by a rounding.
             is_live = self._live_tick is not None and tick >= self._live_tick
             volts = self.hypotheses.command(tick) if is_live else self.machine.initial_command
-            self.applied.append(tuple([max(-5.0, min(5.0, one)) for one in volts]))
-            self.plant.step(self.applied[-1])
+            self.applied.append(volts)
+            self.plant.step(volts)
         self.sample += 1
 
     def _send(self) -> None:

@@ -202,6 +202,8 @@ class Hypotheses:
         command that does.
         """
         carried = self._carried()
+        if len(carried) == 1:
+            return self._command_of(carried[0][1], tick)
         commands = [self._command_of(node, tick) for _, node in carried]
         total = sum([weight for weight, _ in carried])
         mean = []

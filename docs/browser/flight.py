@@ -44,7 +44,7 @@ from transmitter.session.session import TransmitterSession
 from transmitter.session.state_observer import StateObserver
 
 SESSION_NUMBER = 1
-"""Fixed: both ends are in this page, and nobody else answers."""
+"""Fixed: both ends are in this page, and no other end can answer."""
 SAMPLE_FIELDS = ("sample", "word_sent", "word", "digest", "peer_digest", "about")
 TICKS_AT_ONCE = 20
 """Between two looks at the clock of the wall."""

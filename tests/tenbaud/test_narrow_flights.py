@@ -78,7 +78,7 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
     assert 100 <= meter.symbols <= 104
     assert carried >= 100
     endpoint = flown.transmitter.endpoint
-    assert endpoint.inlet.meter.symbols >= 95  # the last ones may come after the end
+    assert endpoint.inlet.meter.symbols >= 98  # the last ones may come after the end
     assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
 
 

@@ -99,7 +99,7 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "transmitter",
         "down_symbols",
         ("symbols", ORDER),
-        "of a sample that was not confirmed, or of a lost symbol: nobody else knows what came",
+        "of a sample that was not confirmed, or of a lost symbol: no other row says what came",
         lambda row, evidence: _is_unheard(row, evidence),
     ),
     Unclaimed(

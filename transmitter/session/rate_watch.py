@@ -19,7 +19,7 @@ OWN_SHARE = 0.01
 SLOW_SHARE = 0.5
 """Share of ticks with answers overdue above which the way to the receiver and back has part in it."""
 SLOW_NS = 20_000_000
-"""Answers, that is echoes or down symbols, that lag by this and by twice the command lead are overdue."""
+"""Answers, echoes or down symbols, that lag by this and by twice the command lead are overdue."""
 
 
 class RateWatch:

@@ -32,7 +32,8 @@ from tenbaud.config.downlink import OF_SCHEME, DownlinkSection, StateLawSection
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
-MIRRORED = ("pid", "state_feedback")
+DESIGNED = "state_feedback"
+MIRRORED = ("pid", DESIGNED)
 """Controllers that are built in as laws in the codec's arithmetic."""
 Description = dict[str, Any]
 
@@ -61,6 +62,16 @@ def _is_mirrored(config: FlightConfig, controller: Controller | None) -> bool:
     if controller is not None:
         return isinstance(controller, PidLoops | StateFeedback)
     return config.receiver.controller in MIRRORED
+
+
+def designed_law(config: FlightConfig) -> Description | None:
+    """Return the section `downlink.law`; None where no state feedback runs at both ends."""
+    narrow, designed = config.channel.downlink == "narrow", config.receiver.controller == DESIGNED
+    if not (narrow and designed and _is_mirrored(config, None)):
+        return None
+    controller = build_controller(config)
+    assert isinstance(controller, StateFeedback)
+    return controller.law._asdict()
 
 
 def build_two_way(
@@ -182,8 +193,7 @@ def _law(
     if config.downlink.law != StateLawSection() and not isinstance(controller, StateFeedback):
         raise ConfigError(
             "downlink.law has the numbers of a state feedback, and the controller is "
-            f"{config.receiver.controller}: leave it out, or set receiver.controller = "
-            '"state_feedback"'
+            f'{config.receiver.controller}: leave it out, or set receiver.controller = "{DESIGNED}"'
         )
     if isinstance(controller, PidLoops):
         rates = rate_states(controller, terms.signals)

@@ -130,7 +130,7 @@ def _unfinished(target: Path) -> Iterator[tuple[BinaryIO, Path]]:
 
 
 def _keep(path: Path, kept: Path, damaged: BinaryIO) -> None:
-    """Give the damaged file its second name, and close it; RecordingError if that is taken meanwhile."""
+    """Give the damaged file its second name and close it; RecordingError if the name is taken."""
     try:
         kept.hardlink_to(path)
         damaged.close()

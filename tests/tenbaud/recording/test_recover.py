@@ -4,8 +4,8 @@ import os
 import shutil
 import signal
 import threading
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -49,15 +49,18 @@ def test_no_open_file_is_renamed_or_replaced_as_windows_would_refuse_it(
     cut = tmp_path / "transmitter.mcap"
     cut.write_bytes(flight.folder.transmitter.read_bytes()[:100_000])
     renamed: list[Path] = []
-    for name in ("replace", "rename"):
 
-        def watched(source: Path, target: Path, move: Any = getattr(Path, name)) -> Any:
+    def watching(move: Callable[[Path, Path], Path]) -> Callable[[Path, Path], Path]:
+        def watched(source: Path, target: Path) -> Path:
             opened = {os.path.realpath(one) for one in Path("/proc/self/fd").iterdir()}
             assert opened.isdisjoint({str(source), str(target)})
             renamed.append(source)
             return move(source, target)
 
-        monkeypatch.setattr(Path, name, watched)
+        return watched
+
+    monkeypatch.setattr(Path, "replace", watching(Path.replace))
+    monkeypatch.setattr(Path, "rename", watching(Path.rename))
     if not links:
         monkeypatch.setattr(Path, "hardlink_to", lambda *_: (_ for _ in ()).throw(OSError))
     recover(cut)

@@ -47,8 +47,8 @@ def describe(path: Path) -> list[Description]:
 def describe_text(path: Path) -> str:
     """The same for a person, as plain text; for a run folder headed by the run's figures."""
     described = describe(path)
-    shown: set[object] = set()
-    parts = [_headline(path), *[_text(description, shown) for description in described]]
+    printed: set[object] = set()
+    parts = [_headline(path), *[_text(description, printed) for description in described]]
     if not all(description.recording.complete for description in described):
         parts.append(f"`tenbaud recover {path}` repairs truncated or damaged files")
     return printable("\n\n".join(part for part in parts if part))
@@ -119,8 +119,8 @@ def _count(text: str | None) -> int | None:
     return int(text) if text is not None and text.isascii() and text.isdigit() else None
 
 
-def _text(description: Description, shown: set[object]) -> str:
-    """Return a recording as text; of what is `shown` already, that of the other end, only the names."""
+def _text(description: Description, printed: set[object]) -> str:
+    """Return a recording as text; of what is `printed` already, that of the other end, only the names."""
     recording, state = description.recording, "complete"
     if not recording.complete:
         state = "damaged: these are the rows that are whole"
@@ -133,18 +133,18 @@ def _text(description: Description, shown: set[object]) -> str:
     if description.error is not None:
         lines.append(f"  {description.error}")
     lines += [f"  {note}" for note in description.notes]
-    same = [item for item in recording.metadata.items() if item in shown]
+    same = [item for item in recording.metadata.items() if item in printed]
     for name, value in recording.metadata.items():
-        if (name, value) not in shown:
+        if (name, value) not in printed:
             lines.extend(_metadata_lines(name, value))
     if same:
         lines.append(f"  as above: {', '.join(name for name, _ in same)}")
     for topic, table in recording.topics.items():
-        known = table.channel in shown
+        known = table.channel in printed
         lines.append("")
         lines.append(f"  {topic}: {_span(table)}{', fields as above' if known else ''}")
         lines.extend([] if known else _field_lines(table.channel))
-    shown |= {*recording.metadata.items(), *[one.channel for one in recording.topics.values()]}
+    printed |= {*recording.metadata.items(), *[one.channel for one in recording.topics.values()]}
     if description.events:
         total = len(recording.topics[EVENT_TOPIC])
         shown = len(description.events)

@@ -120,7 +120,7 @@ def _count(text: str | None) -> int | None:
 
 
 def _text(description: Description, printed: set[object]) -> str:
-    """Return a recording as text; of what is `printed` already, that of the other end, only the names."""
+    """Return a recording as text; of what the other end's has `printed`, only the names."""
     recording, state = description.recording, "complete"
     if not recording.complete:
         state = "damaged: these are the rows that are whole"

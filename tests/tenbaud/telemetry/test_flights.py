@@ -104,7 +104,7 @@ def controls(path: Path) -> list[str]:
 
 
 def corrupt_until_found(pair: Watched, end: str) -> None:
-    """Corrupt a codec of a narrow flight until a hash bit shows it: one change in ten vanishes before."""
+    """Corrupt a codec of a narrow flight until it is found: one change in ten vanishes unseen."""
 
     def rejoins() -> int:
         return int(pair.newest("transmitter").counts["rejoins"])

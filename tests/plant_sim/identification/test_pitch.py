@@ -95,7 +95,7 @@ def test_when_the_motor_lag_is_not_given_then_it_is_found() -> None:
 
 
 def test_when_something_else_pushes_the_body_then_it_is_never_a_silent_wrong_estimate() -> None:
-    record = experiment(EXCITATION_A, 30.0)
+    record = experiment(EXCITATION_A, 20.0, step_s=0.02)
     times = np.arange(len(record)) * record.step_s
     pushed = replace(record, outputs=record.outputs + 0.3 * np.sin(2.0 * times)[:, None])
     found = identify(pushed, PitchStructure(TRUE.equilibrium_rad))

@@ -120,8 +120,10 @@ class ReceiverEndpoint:
             frame = self._slots.located(frame, session.due_slot, now_ns)
         answers = session.on_frame(frame, now_ns)
         if isinstance(frame, Hello):
-            sizes = [self.inlet.wire.size(self.inlet.wire.encode(answer)) for answer in answers]
-            self._slots.answered(frame, answers, now_ns + sum(sizes) * session.terms.downlink_byte_ns)
+            wire, terms = self.inlet.wire, session.terms
+            asked_ns = now_ns - wire.size(data) * terms.uplink_line_ns
+            size = sum([wire.size(wire.encode(answer)) for answer in answers])
+            self._slots.answered(frame, answers, asked_ns, now_ns + size * terms.downlink_byte_ns)
         return answers
 
 

@@ -39,6 +39,7 @@ class SplitLink(Link):
     def __init__(self, role: Role, up: Link, down: Link) -> None:
         self.name = f"{up.name} up, {down.name} down"
         self.wire: Wire = SplitWire(up.wire, down.wire)
+        self.start_ns = up.start_ns
         self._out, self._in = (up, down) if role == "transmitter" else (down, up)
 
     @property

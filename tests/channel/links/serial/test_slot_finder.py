@@ -7,7 +7,7 @@ import random
 import pytest
 
 from channel.links.serial.slot_finder import RIVALS, Place, SlotFinder
-from channel.protocol.frames import ShortSymbol
+from channel.protocol.frames import Hello, ShortSymbol, Welcome
 from tests.channel.codec.parts import terms
 
 MODULUS = 8
@@ -79,6 +79,25 @@ def test_when_the_grid_is_known_then_down_symbols_are_placed_from_the_first_one_
             assert (place.slot, place.in_time) == (slot, True)
             noise = (slot + chooser.randrange(2, MODULUS - 1)) % MODULUS
             assert not finder.find(ShortSymbol(0, noise, MODULUS), 0, came_ns + MS).in_time
+
+
+@pytest.mark.parametrize("off_slots", [0, MODULUS])
+def test_when_a_request_names_another_sample_than_the_schedule_then_it_is_begun_anew(
+    off_slots: int,
+) -> None:
+    line = Line()
+    first = Hello(5, "", b"", b"")
+    line.finder.answered(first, [Welcome(77, 0, 0, 5)], 0, 0)
+    for slot in range(3):
+        line.hear(slot, line.due_ns(slot + off_slots))  # it began late: all are taken for later ones
+    assert line.expected == 3 + off_slots
+    for request, sample in enumerate((12, 40), 1):
+        asked_ns = line.due_ns(sample + off_slots) - 90 * MS
+        again = Hello(5, "", b"", b"", request, sample=sample)
+        line.finder.answered(again, [Welcome(77, request, sample + 1, 5, request)], asked_ns, asked_ns)
+        line.expected, line.anchor = sample + 1, None
+        for slot in range(sample + 1, sample + 9):
+            assert line.hear(slot, line.due_ns(slot + off_slots)).slot == slot
 
 
 @pytest.mark.parametrize("first", [1, 3, 7, 8, 9, 20])

@@ -9,8 +9,8 @@ that fit each other and not the schedule replaces it.
 The transmitter, to which down symbols come, knows the schedule: it counts from its own tick 0
 (`expect`). At the receiver it is known before the first symbol from the handshake: tick 0 lies between
 the end of the answer to its hello and `START_NS` later (`Link.start_ns`). A later hello names the
-transmitter's sample: a schedule that contradicts it is forgotten. A wrong guess anywhere here is a wrong
-or an erased symbol, which the echo covers.
+transmitter's sample: a schedule that contradicts it is forgotten. A wrong guess anywhere here is a
+wrong or an erased symbol, which the echo covers.
 """
 
 from __future__ import annotations

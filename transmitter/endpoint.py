@@ -228,7 +228,7 @@ class TransmitterNode:
 
 def _down_slots(session: TransmitterSession) -> SlotFinder | None:
     """Return what finds the slots of symbol bytes that come down; None where none come."""
-    if session.terms.downlink != "narrow":
+    if not session.terms.is_narrow:
         return None
     finder = SlotFinder(session.terms.down_grid)
     finder.expect(session.line_delay_ns)

@@ -68,7 +68,7 @@ class NarrowFollowing:
         self._age_max = -(-AGE_UNKNOWN_SYMBOLS // parts.terms.down_symbols)
         terms = parts.terms
         slots_ns = SILENT_SLOTS * terms.sample_ns // terms.down_symbols
-        silent_ns = slots_ns + terms.down_heard_ns + line_delay_ns
+        silent_ns = slots_ns + terms.heard_ns + line_delay_ns
         self._silent_ticks_max = -(-silent_ns // terms.tick_ns)
         self._came_tick: int | None = None
         """of the last down symbol, or of the epoch's beginning; None: none has come in this flight"""

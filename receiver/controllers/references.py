@@ -139,8 +139,7 @@ class LimitedReference:
     def __init__(
         self, programme: Reference, start: float, largest: float, step: float, kept: int = KEPT
     ) -> None:
-        self.by_hand: float | None = None
-        """in place of the programme, within the same limits; None: the programme"""
+        self._by_hand: float | None = None
         self.largest = largest
         self._programme, self._step = programme, step
         self._tick = -1
@@ -154,9 +153,14 @@ class LimitedReference:
     def value(self, tick: int) -> float:
         while self._tick < tick:
             self._tick += 1
-            wanted = self._programme.value(self._tick) if self.by_hand is None else self.by_hand
+            by_hand = self._by_hand
+            wanted = self._programme.value(self._tick) if by_hand is None else by_hand
             self._kept.append(limited(wanted, self._kept[-1], self.largest, self._step))
         return self._kept[max(tick - self._tick - 1, -len(self._kept))]
+
+    def steer(self, value: float | None) -> None:
+        """Take this in place of the programme, within the same limits; None: the programme again."""
+        self._by_hand = value
 
 
 class SteeredReference:
@@ -169,8 +173,7 @@ class SteeredReference:
         self, programme: Reference, stops: tuple[float, float] = (-math.inf, math.inf)
     ) -> None:
         self._programme = programme
-        self._limits = programme if isinstance(programme, LimitedReference) else None
-        largest = math.inf if self._limits is None else self._limits.largest
+        largest = programme.largest if isinstance(programme, LimitedReference) else math.inf
         self.stops = max(stops[0], -largest), min(stops[1], largest)
         """least and largest set-point that the plant can reach"""
         self.by_hand: float | None = None
@@ -179,16 +182,16 @@ class SteeredReference:
     def steer(self, value: float | None) -> None:
         """Take the set-point by hand; None gives it back to the configured reference."""
         self.by_hand = value
-        if self._limits is not None:
-            self._limits.by_hand = value
+        if isinstance(self._programme, LimitedReference):
+            self._programme.steer(value)
 
     def begin(self, tick: int, start: float) -> None:
         """Move from `start` at this tick, where the set-point has limits."""
-        if self._limits is not None:
-            self._limits.begin(tick, start)
+        if isinstance(self._programme, LimitedReference):
+            self._programme.begin(tick, start)
 
     def value(self, tick: int) -> float:
-        if self.by_hand is None or self._limits is not None:
+        if self.by_hand is None or isinstance(self._programme, LimitedReference):
             return self._programme.value(tick)
         return self.by_hand
 

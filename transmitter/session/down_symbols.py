@@ -218,11 +218,9 @@ class NarrowFollowing:
         self.certainty.on_heard(listed.size)
         if listed.rejoin is None:
             return None
-        why, _, rest, lag, detail = listed.rejoin
-        if why is Why.REST:
+        if listed.rejoin.why is Why.REST:
             self._write_assumed()
-        asked = replace(ASKED, sample=listed.next_confirmed, number=lag, value=rest, detail=detail)
-        return Lost(why, asked)
+        return Lost(*listed.rejoin)
 
     def _write_assumed(self) -> None:
         """Record the samples that are not certain: the first one that differs may be among them."""

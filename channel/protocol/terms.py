@@ -221,7 +221,7 @@ class Terms:
 
     @property
     def heard_ns(self) -> int:
-        """Return how long after a sample's first tick its commands, or all its down symbols, have come."""
+        """Return how long after a sample's first tick its commands, or down symbols, have come."""
         word_ns = self.uplink_delivery_ns + self.uplink_line_ns + self.deadline_allowance_ns
         if not self.is_narrow:
             return word_ns + self.downlink_line_ns + self.downlink_budget_ns

@@ -16,10 +16,10 @@ wrong or an erased symbol, which the echo covers.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from channel.protocol.frames import Frame, Hello, LocatedSymbol, ShortSymbol, Welcome
+from channel.protocol.rivals import Rivals
 from channel.protocol.terms import SlotGrid
 
 START_NS = 250_000_000
@@ -28,7 +28,6 @@ START_SLACK_NS = 50_000_000
 HELLO_SLOTS = 3.0
 """How far the sample of a hello may be off the schedule: the transmitter may have been held up."""
 
-RIVALS = 3
 RIVAL_SLOTS = 0.25
 EARLY_SLOTS = 0.5
 LATE_SLOTS = 0.5
@@ -41,13 +40,6 @@ class Place(NamedTuple):
     slot: int | None
     in_time: bool
     anchor: tuple[int, int] | None
-
-
-@dataclass(slots=True)
-class _Rival:
-    slot: int
-    time_ns: int
-    count: int = 1
 
 
 class SlotFinder:
@@ -63,7 +55,7 @@ class SlotFinder:
         self._zero_ns: float | None = None
         """when slot 0 would have arrived, by the schedule"""
         self._taken = 0
-        self._rival: _Rival | None = None
+        self._rivals = Rivals(self._slot_ns, max(RIVAL_SLOTS, self._allowance))
         self._incarnation: int | None = None
         """of the transmitter that flies"""
 
@@ -74,7 +66,8 @@ class SlotFinder:
                 self._incarnation = hello.incarnation
                 ahead = answer.first_sample - hello.sample if hello.sample else 0
                 self.begin(answer.first_sample * self._grid.slots, ahead * self._grid.slots)
-        self.greeted(now_ns)
+        if self._zero_ns is None:
+            self._greeted_ns = now_ns
 
     def expect(self, line_delay_ns: int = 0) -> None:
         """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
@@ -94,15 +87,10 @@ class SlotFinder:
         ahead = hello.sample * count - place
         return hello.sample > 0 and not -HELLO_SLOTS <= ahead <= count + HELLO_SLOTS
 
-    def greeted(self, now_ns: int) -> None:
-        """Note the time of a hello that was answered with a welcome."""
-        if self._zero_ns is None:
-            self._greeted_ns = now_ns
-
     def begin(self, first_slot: int, ahead_slots: int) -> None:
         """Forget the schedule: another transmitter begins, `ahead_slots` after its hello."""
         self._zero_ns = None
-        self._rival = None
+        self._rivals.clear()
         self._first_slot = first_slot
         self._ahead_ns = round(ahead_slots * self._slot_ns)
 
@@ -117,13 +105,13 @@ class SlotFinder:
         # this is one of a heap that waited while this process did not run.
         in_time = slot >= expected and -early <= max(LATE_SLOTS, 2.0 * self._allowance)
         if in_time and early <= max(EARLY_SLOTS, self._allowance):
-            self._rival = None
+            self._rivals.clear()
             self._taken += 1
             gain = max(GAIN_MIN, 1.0 / (1.0 + self._taken))
             self._zero_ns -= gain * early * self._slot_ns
             due_ns = round(self._zero_ns + slot * self._slot_ns)
             return Place(slot, True, (slot, max(now_ns, due_ns)))
-        if self._is_rival(slot, now_ns):
+        if self._rivals.complete(slot, now_ns):
             self._start(slot, now_ns)
             return Place(slot, slot >= expected, (slot, now_ns))
         return Place(None if early > 0.0 and slot >= expected else slot, False, None)
@@ -143,19 +131,7 @@ class SlotFinder:
     def _start(self, slot: int, now_ns: int) -> None:
         self._zero_ns = now_ns - slot * self._slot_ns
         self._taken = 0
-        self._rival = None
-
-    def _is_rival(self, slot: int, now_ns: int) -> bool:
-        """Return whether this byte is the last of a row that fits itself."""
-        rival = self._rival
-        if rival is not None:
-            slots = (now_ns - rival.time_ns) / self._slot_ns
-            off = abs(slot - rival.slot - slots)
-            if slot > rival.slot and off <= max(RIVAL_SLOTS, self._allowance):
-                self._rival = _Rival(slot, now_ns, rival.count + 1)
-                return self._rival.count >= RIVALS
-        self._rival = _Rival(slot, now_ns)
-        return False
+        self._rivals.clear()
 
 
 def _nearest(symbol: ShortSymbol, place: float) -> int:

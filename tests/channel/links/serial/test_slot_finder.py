@@ -6,8 +6,9 @@ import random
 
 import pytest
 
-from channel.links.serial.slot_finder import RIVALS, Place, SlotFinder
+from channel.links.serial.slot_finder import Place, SlotFinder
 from channel.protocol.frames import Hello, ShortSymbol, Welcome
+from channel.protocol.rivals import RIVALS
 from tests.channel.codec.parts import terms
 
 MODULUS = 8
@@ -22,7 +23,7 @@ class Line:
 
     def __init__(self, start_ns: int = START_NS, allowance_ns: int = 20 * MS) -> None:
         self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns).up_grid)
-        self.finder.greeted(0)
+        self.finder.answered(Hello(5, "", b"", b""), [Welcome(77, 0, 0, 5)], 0, 0)
         self.start_ns = start_ns
         self.allowance_ns = allowance_ns
         self.expected = 0
@@ -86,8 +87,6 @@ def test_when_a_request_names_another_sample_than_the_schedule_then_it_is_begun_
     off_slots: int,
 ) -> None:
     line = Line()
-    first = Hello(5, "", b"", b"")
-    line.finder.answered(first, [Welcome(77, 0, 0, 5)], 0, 0)
     for slot in range(3):
         line.hear(slot, line.due_ns(slot + off_slots))  # it began late: all are taken for later ones
     assert line.expected == 3 + off_slots

@@ -53,6 +53,7 @@ class OpenLoopZoomCoder(SignCoder):
     """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
 
     functions = CoderFunctions(encode_signs, open_loop_zoom_decode)
+    parameters: OpenLoopZoomParameters
 
     def __init__(self, parameters: OpenLoopZoomParameters) -> None:
         super().__init__(parameters)

@@ -71,6 +71,7 @@ class ZoomCoder(SignCoder):
     """
 
     functions = CoderFunctions(encode_signs, zoom_decode)
+    parameters: ZoomParameters
 
     def __init__(self, parameters: ZoomParameters) -> None:
         super().__init__(parameters)

@@ -117,7 +117,7 @@ class ReceiverEndpoint:
         if frame is None:
             return []
         if isinstance(frame, ShortSymbol) and session.due_slot is not None:
-            frame = self._slots.located(frame, session.due_slot, now_ns)
+            frame = self._slots.find(frame, session.due_slot, now_ns)
         answers = session.on_frame(frame, now_ns)
         if isinstance(frame, Hello):
             wire, terms = self.inlet.wire, session.terms

@@ -16,7 +16,6 @@ wrong or an erased symbol, which the echo covers.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from channel.protocol.frames import Frame, Hello, LocatedSymbol, ShortSymbol, Welcome
 from channel.protocol.rivals import Rivals
@@ -32,14 +31,6 @@ RIVAL_SLOTS = 0.25
 EARLY_SLOTS = 0.5
 LATE_SLOTS = 0.5
 GAIN_MIN = 1.0 / 16.0
-
-
-class Place(NamedTuple):
-    """The location of a symbol byte; as in `LocatedSymbol`."""
-
-    slot: int | None
-    in_time: bool
-    anchor: tuple[int, int] | None
 
 
 class SlotFinder:
@@ -63,20 +54,17 @@ class SlotFinder:
         """Note the answer to a hello that left at `asked_ns`; it is on the line until `now_ns`."""
         for answer in answers:
             if isinstance(answer, Welcome) and self._is_news(hello, asked_ns):
-                self._incarnation = hello.incarnation
+                self._incarnation, self._zero_ns = hello.incarnation, None
+                self._rivals.clear()
                 ahead = answer.first_sample - hello.sample if hello.sample else 0
-                self.begin(answer.first_sample * self._grid.slots, ahead * self._grid.slots)
+                self._first_slot = answer.first_sample * self._grid.slots
+                self._ahead_ns = ahead * self._grid.sample_ns
         if self._zero_ns is None:
             self._greeted_ns = now_ns
 
     def expect(self, line_delay_ns: int = 0) -> None:
         """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
         self._zero_ns = self._grid.due_ns(0) + line_delay_ns // 2
-
-    def located(self, symbol: ShortSymbol, due_slot: int, now_ns: int) -> LocatedSymbol:
-        """Return a symbol byte that came at `now_ns` with its slot; `due_slot` is not settled yet."""
-        place = self.find(symbol, due_slot, now_ns)
-        return LocatedSymbol(symbol.number, place.slot, symbol.slot_low, place.in_time, place.anchor)
 
     def _is_news(self, hello: Hello, asked_ns: int) -> bool:
         """Return whether the schedule is not that of the transmitter that asks."""
@@ -87,15 +75,8 @@ class SlotFinder:
         ahead = hello.sample * count - place
         return hello.sample > 0 and not -HELLO_SLOTS <= ahead <= count + HELLO_SLOTS
 
-    def begin(self, first_slot: int, ahead_slots: int) -> None:
-        """Forget the schedule: another transmitter begins, `ahead_slots` after its hello."""
-        self._zero_ns = None
-        self._rivals.clear()
-        self._first_slot = first_slot
-        self._ahead_ns = round(ahead_slots * self._slot_ns)
-
-    def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> Place:
-        """Return where a symbol byte that came at `now_ns` belongs; `expected` is not settled yet."""
+    def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> LocatedSymbol:
+        """Return a symbol byte that came at `now_ns` with its slot; `expected` is not settled yet."""
         if self._zero_ns is None:
             return self._first(symbol, now_ns)
         place = (now_ns - self._zero_ns) / self._slot_ns
@@ -110,13 +91,13 @@ class SlotFinder:
             gain = max(GAIN_MIN, 1.0 / (1.0 + self._taken))
             self._zero_ns -= gain * early * self._slot_ns
             due_ns = round(self._zero_ns + slot * self._slot_ns)
-            return Place(slot, True, (slot, max(now_ns, due_ns)))
+            return _located(symbol, slot, True, (slot, max(now_ns, due_ns)))
         if self._rivals.complete(slot, now_ns):
             self._start(slot, now_ns)
-            return Place(slot, slot >= expected, (slot, now_ns))
-        return Place(None if early > 0.0 and slot >= expected else slot, False, None)
+            return _located(symbol, slot, slot >= expected, (slot, now_ns))
+        return _located(symbol, None if early > 0.0 and slot >= expected else slot)
 
-    def _first(self, symbol: ShortSymbol, now_ns: int) -> Place:
+    def _first(self, symbol: ShortSymbol, now_ns: int) -> LocatedSymbol:
         since_ns = now_ns - self._greeted_ns - self._grid.delivery_ns - self._ahead_ns
         first = self._first_slot
         place = (since_ns - START_NS / 2) / self._slot_ns
@@ -124,14 +105,20 @@ class SlotFinder:
         earliest = first + (since_ns - START_NS) / self._slot_ns - EARLY_SLOTS
         latest = first + (since_ns + START_SLACK_NS) / self._slot_ns + EARLY_SLOTS
         if not earliest <= slot <= latest:
-            return Place(None, False, None)
+            return _located(symbol, None)
         self._start(slot, now_ns)
-        return Place(slot, True, (slot, now_ns))
+        return _located(symbol, slot, True, (slot, now_ns))
 
     def _start(self, slot: int, now_ns: int) -> None:
         self._zero_ns = now_ns - slot * self._slot_ns
         self._taken = 0
         self._rivals.clear()
+
+
+def _located(
+    symbol: ShortSymbol, slot: int | None, in_time: bool = False, anchor: tuple[int, int] | None = None
+) -> LocatedSymbol:
+    return LocatedSymbol(symbol.number, slot, symbol.slot_low, in_time, anchor)
 
 
 def _nearest(symbol: ShortSymbol, place: float) -> int:

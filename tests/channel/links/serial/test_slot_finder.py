@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from channel.links.serial.slot_finder import Place, SlotFinder
-from channel.protocol.frames import Hello, ShortSymbol, Welcome
+from channel.links.serial.slot_finder import SlotFinder
+from channel.protocol.frames import Hello, LocatedSymbol, ShortSymbol, Welcome
 from channel.protocol.rivals import RIVALS
 from tests.channel.codec.parts import terms
 
@@ -32,7 +32,7 @@ class Line:
     def due_ns(self, slot: int) -> int:
         return self.start_ns + slot * SLOT_NS
 
-    def hear(self, slot_low: int, time_ns: int) -> Place:
+    def hear(self, slot_low: int, time_ns: int) -> LocatedSymbol:
         while self.anchor is not None and self._deadline_ns() < time_ns:
             self.expected += 1
         symbol = ShortSymbol(0, slot_low % MODULUS, MODULUS)
@@ -127,7 +127,7 @@ def test_when_a_byte_of_noise_looks_like_a_later_slot_then_it_is_refused() -> No
     line = Line()
     line.hear(0, line.due_ns(0))
     for low in (2, 3, 4):
-        assert line.hear(low, line.due_ns(1) - 10 * MS) == Place(None, False, None)
+        assert line.hear(low, line.due_ns(1) - 10 * MS) == LocatedSymbol(0, None, low, False, None)
     assert line.hear(1, line.due_ns(1)).slot == 1
 
 
@@ -179,5 +179,5 @@ def test_when_a_heap_of_bytes_is_read_at_once_then_it_does_not_move_the_schedule
 def test_when_noise_comes_before_the_first_symbol_then_it_is_refused_if_it_cannot_be_due() -> None:
     line = Line()
     for low in range(2, MODULUS):
-        assert line.hear(low, 5 * MS) == Place(None, False, None)
+        assert line.hear(low, 5 * MS) == LocatedSymbol(0, None, low, False, None)
     assert line.hear(0, line.due_ns(0)).slot == 0

@@ -117,7 +117,7 @@ class TransmitterNode:
         if not self.session.following.unrecorded:
             return
         per_sample = self.session.terms.ticks_per_sample
-        for done in self.session.take_confirmed():
+        for done in self.session.following.take_confirmed():
             pairs = zip(done.flown.coded, done.live, strict=True)
             self.scores.on_word(done.word, done.about)
             for tick, (coded, live) in enumerate(pairs, done.sample * per_sample):

@@ -106,7 +106,7 @@ def test_when_nothing_is_confirmed_any_more_then_commands_stop_after_four_usual_
     pair = Pair()
     pair.fly(50)
     assert None not in pair.commands[PER_SAMPLE:]
-    pair.transmitter.take_confirmed()
+    pair.following.take_confirmed()
     sure = pair.following.hypotheses.next_confirmed
     usual = median(pair.rows.column("confirmed", "lag_samples"))
     assert pair.following._age_max == max(AGE_LEAST_SAMPLES, round(AGE_FACTOR * usual))

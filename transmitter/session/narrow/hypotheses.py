@@ -376,7 +376,7 @@ class Hypotheses:
         self.priors.learn(sent, node.word, before.word)
         self.priors.learn_symbols(symbols, heard)
         if commands and machine.scheme.is_idle(before.state.down):
-            self.priors.learn_news(commands[0] == 1)
+            self.priors.news.count(commands[0] == 1)
         assert node.flown is not None  # only the root has none
         return Confirmed(
             sample=node.sample,

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from channel.protocol.recording import RecordChannel, Recorder
 from tenbaud.build.flight import Agreement
-from tenbaud.recording.display import picture_html
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.notebook import Cell, progress_html
 from tenbaud.recording.overview import OverviewRecorder
+from tenbaud.recording.style import picture_html
 
 PERIOD_S = 0.5
 DRAWING_SHARE = 0.25

@@ -182,6 +182,16 @@ def find_recordings(path: Path) -> list[Path]:
     return found
 
 
+def open_plain(path: Path) -> BinaryIO:
+    """Open a file for reading; OSError for what is missing or no plain file."""
+    # Without O_NONBLOCK a pipe laid in its place would be waited for.
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EINVAL, "it is not a file", str(path))
+    return open(handle, "rb")
+
+
 def read_small(path: Path) -> str:
     """Return the text of a small file of a run folder.
 
@@ -189,10 +199,7 @@ def read_small(path: Path) -> str:
     RecordingError for a symbolic link.
     """
     is_own_file(path)
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    with open(handle, "rb") as stream:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError(errno.EINVAL, "it is no plain file", str(path))
+    with open_plain(path) as stream:
         data = stream.read(SMALL_BYTES_MAX + 1)
     if len(data) > SMALL_BYTES_MAX:
         raise OSError(errno.EFBIG, f"it has more than {SMALL_BYTES_MAX} bytes", str(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -67,3 +68,11 @@ def save(figure: Figure, paths: Sequence[Path]) -> None:
         unwritten = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix, "Software")
         with whole_file(path) as stream:
             figure.savefig(stream, dpi=100, metadata={unwritten: None}, format=path.suffix[1:])
+
+
+def picture_html(figure: Figure, dots_per_inch: int = 90) -> str:
+    """Return a figure as an image in HTML."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=dots_per_inch)
+    data = b64encode(stream.getvalue()).decode()
+    return f'<img alt="outputs and estimate errors over time" src="data:image/png;base64,{data}">'

@@ -26,7 +26,6 @@ from channel.protocol.recording import (
 from receiver.session import records as receiver
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.recover import RECOVERED_NOTE
-from tenbaud.recording.table import Table
 from transmitter.metrics.gap import GAP_CHANNEL
 from transmitter.session import records as transmitter
 
@@ -140,23 +139,21 @@ def read_rows(end: str, tables: Recording) -> EndRows:
     topics: dict[str, Topic] = {}
     for name, kind in KINDS[end].items():
         table = tables.topics.get(name)
-        topics[name] = Topic() if table is None else _typed(name, kind, table, misfits)
+        topics[name] = Topic() if table is None else _typed(name, kind, tables, misfits)
     foreign = [name for name in tables.topics if name not in KINDS[end]]
     complete = bool(tables.end) and RECOVERED_NOTE not in tables.end
     return EndRows(end, complete, topics, misfits, foreign)
 
 
-def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
-    topic = Topic(recorded=True)
-    lacking = [one.name for one in kind.channel.fields if one.name not in table.names]
+def _typed(name: str, kind: Kind, tables: Recording, misfits: list[Misfit]) -> Topic:
+    topic, names = Topic(recorded=True), tables.topics[name].names
+    lacking = [one.name for one in kind.channel.fields if one.name not in names]
     if lacking:
         misfits.append(Misfit(name, "every row", lacking[0], "this field is not recorded"))
         return topic
     fields = kind.channel.fields
     make = kind.record._make
-    times_ns = table.times_ns.tolist()
-    rows = (row for block in table.blocks() for row in block)
-    for index, (row, time_ns) in enumerate(zip(rows, times_ns, strict=True)):
+    for index, (time_ns, row) in enumerate(tables.rows(name)):
         read = (row.get(one.name) for one in fields)
         values: list[Any] = [tuple(value) if type(value) is list else value for value in read]
         pairs = zip(fields, values, strict=True)

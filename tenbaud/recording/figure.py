@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -11,19 +10,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from channel.codec.signals import Signal, Signals
+from channel.codec.signals import Signal
 from channel.line.impairments import parse_impairments
 from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA, recorded_signals
-from tenbaud.recording.envelope import Curve, Series
+from tenbaud.recording.envelope import Curve
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.overview import (
-    FIELDS,
-    Columns,
-    Overview,
-    marks_of,
-    unpacked,
-)
+from tenbaud.recording.overview import FIELDS, Columns, Overview, marks_of, unpacked
 from tenbaud.recording.pose import draw_poses, has_poses
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
@@ -50,22 +43,34 @@ DRAWN_MAX = 8
 _Draw = Callable[["Axes", "_Flight"], None]
 
 
-@dataclass(frozen=True, slots=True)
 class _Flight:
-    """The contents of the figure."""
+    """The contents of the figure: curves and marks of a transmitter, thinned to what can be seen."""
 
-    plant: Signals
-    curves: dict[str, list[Curve]]
-    """name of a curve -> that of each output, or of each input"""
-    marks: dict[str, Series]
-    symbols: Curve
-    symbols_are_means: bool
-    about: list[Series]
-    """of each output: which symbols were about it, or their share; nothing where that is not known"""
-    cuts_s: list[tuple[float, float]]
-    """times in which nothing was to pass, on purpose"""
-    usual: Curve | None = None
-    """the first output over 1000 bit/s"""
+    def __init__(
+        self, overview: Overview, theirs: Overview | None, impairments: str, usual: Curve | None
+    ) -> None:
+        """Raises RecordingError where the transmitter recorded no tick."""
+        self.plant = overview.plant
+        held = overview.curves
+        if theirs is not None and theirs.plant == self.plant:
+            held = {**held, "reference": theirs.curves["reference"]}
+        self.curves = {name: [one.curve() for one in curves] for name, curves in held.items()}
+        """name of a curve -> that of each output, or of each input"""
+        times_s = self.curves["value"][0][0] if self.plant.outputs else np.zeros(0)
+        if not len(times_s):
+            raise RecordingError(
+                "The recording holds no ticks: give a transmitter's recording of a flight."
+            )
+        self.marks = {name: marks_of(one) for name, one in overview.marks.items()}
+        self.symbols, self.symbols_are_means = overview.symbols.curve(), overview.symbols.thinned
+        means = sorted(overview.means().items())
+        shares = [one.curve()[1] for _, one in means if one is not overview.symbols]
+        self.about = [] if all(np.isnan(one).all() for one in shares) else shares
+        """of each output: which symbols were about it, or their share; nothing where it is not known"""
+        self.cuts_s = _cuts(impairments, times_s[-1])
+        """times in which nothing was to pass, on purpose"""
+        self.usual = usual
+        """the first output over 1000 bit/s"""
 
     @property
     def live_is_coded(self) -> bool:
@@ -121,7 +126,7 @@ def draw_overviews(
 
     Raises RecordingError where the transmitter recorded no tick.
     """
-    flight = _flight(overview, theirs, impairments, usual)
+    flight = _Flight(overview, theirs, impairments, usual)
     drawn = _panels(flight)
     ratios = [ratio for ratio, _, _ in drawn]
     height = (0.9 + sum(ratios)) / len(drawn)
@@ -184,36 +189,6 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
 def _plain(label: str) -> str:
     """Return a label as matplotlib shows it: a dollar sign would begin an equation."""
     return label.replace("$", r"\$")
-
-
-def _flight(
-    overview: Overview, theirs: Overview | None, impairments: str, usual: Curve | None
-) -> _Flight:
-    plant = overview.plant
-    times_s = overview.curves["value"][0].curve()[0] if plant.outputs else np.zeros(0)
-    if not len(times_s):
-        raise RecordingError(
-            "The recording holds no ticks: give a transmitter's recording of a flight."
-        )
-    if theirs is not None and theirs.plant == plant:
-        overview.curves["reference"] = theirs.curves["reference"]
-    return _Flight(
-        plant,
-        {name: [one.curve() for one in held] for name, held in overview.curves.items()},
-        {name: marks_of(one) for name, one in overview.marks.items()},
-        overview.symbols.curve(),
-        overview.symbols.thinned,
-        _about(overview),
-        _cuts(impairments, times_s[-1]),
-        usual,
-    )
-
-
-def _about(overview: Overview) -> list[Series]:
-    shares = [
-        one.curve()[1] for _, one in sorted(overview.means().items()) if one is not overview.symbols
-    ]
-    return [] if all(np.isnan(one).all() for one in shares) else shares
 
 
 def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, str]]:

@@ -65,17 +65,11 @@ class NotebookDrawing:
 
 
 class _Passing:
-    """Hands rows on to a recorder, and the drawn ones to an overview too."""
+    """Hands rows on to a recorder and to an overview."""
 
-    def __init__(self, recorder: Recorder, overview: OverviewRecorder) -> None:
-        self._recorder = recorder
-        self._overview = overview
-        self._drawn: dict[int, bool] = {}
+    def __init__(self, *recorders: Recorder) -> None:
+        self._recorders = recorders
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
-        self._recorder.write(channel, time_ns, row)
-        drawn = self._drawn.get(id(channel))
-        if drawn is None:
-            drawn = self._drawn[id(channel)] = self._overview.wants(channel)
-        if drawn:
-            self._overview.add(channel.topic, max(0, time_ns), row)
+        for recorder in self._recorders:
+            recorder.write(channel, time_ns, row)

@@ -252,7 +252,7 @@ def unpacked(metadata: Mapping[str, str], plant: Signals) -> Overview | None:
 
 
 class OverviewRecorder:
-    """Gathers an overview from rows as they are recorded, some at a time."""
+    """A `Recorder` that gathers an overview from the rows written to it, some at a time."""
 
     def __init__(self, plant: Signals) -> None:
         self._overview = Overview(plant)
@@ -260,15 +260,16 @@ class OverviewRecorder:
         self._places: dict[str, dict[str, int]] = {}
         self._count = 0
 
-    def wants(self, channel: RecordChannel) -> bool:
-        """Whether rows of this channel are to be handed to `add`."""
-        self._places[channel.topic] = {one.name: place for place, one in enumerate(channel.fields)}
-        self._rows.setdefault(channel.topic, ([], []))
-        return channel.topic in FIELDS
-
-    def add(self, topic: str, time_ns: int, row: Sequence[object]) -> None:
+    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
+        """Take one row, filed at tick 0 where it came before."""
+        topic = channel.topic
+        if topic not in FIELDS:
+            return
+        if topic not in self._rows:
+            self._places[topic] = {one.name: place for place, one in enumerate(channel.fields)}
+            self._rows[topic] = ([], [])
         times, rows = self._rows[topic]
-        times.append(time_ns)
+        times.append(max(0, time_ns))
         rows.append(row)
         if len(rows) >= BLOCK_ROWS:
             self._take(topic)

@@ -11,6 +11,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import BinaryIO
 
@@ -150,20 +151,15 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
     channels: dict[str, int] = {}
     writer = ChunkWriter(output, CHUNK_BYTES)
     writer.start(profile=PROFILE, library="tenbaud")
-    headed = False
-    for topic, time_ns, data in stream.undecoded():
-        if not headed:
-            headed = True
-            writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    messages = stream.undecoded()
+    first = [*islice(messages, 1)]  # the head comes before it
+    writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    for topic, time_ns, data in chain(first, messages):
         if topic not in channels:
-            channel = stream.channels[topic]
-            schema = writer.register_schema(topic, "jsonschema", channel_schema(channel))
-            channels[topic] = writer.register_channel(topic, "json", schema)
+            channels[topic] = writer.register(topic, channel_schema(stream.channels[topic]))
         writer.add_message(channels[topic], time_ns, data)
         rows += 1
         last_ns = max(last_ns, time_ns)
-    if not headed:
-        writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
     writer.flush()
     if stream.holes:
         writer.add_metadata(HOLES_METADATA, packed_holes(stream.holes))

@@ -27,16 +27,11 @@ QUIET_S = 3.0
 at least once a second while its flight goes on."""
 
 
-def hold(handle: int) -> bool:
-    """Take the lock of an open file for as long as it stays open; False: somebody else has it.
-
-    True also where there are no locks: recording goes on without.
-    """
-    return try_lock(handle) is not False
-
-
 def try_lock(handle: int) -> bool | None:
-    """Return whether the lock was taken; None where there are no locks."""
+    """Take the lock of an open file for as long as it stays open.
+
+    Return whether it was taken; None where there are no locks: recording goes on without.
+    """
     if fcntl is None:
         return None
     try:
@@ -227,7 +222,7 @@ def open_new_recording(path: Path) -> BinaryIO:
         stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
         raise write_error(path, error) from error
-    if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
+    if try_lock(stream.fileno()) is False or os.fstat(stream.fileno()).st_size > 0:
         stream.close()
         raise RecordingError(
             f"The recording {path} exists already and is not overwritten. "

@@ -16,10 +16,9 @@ from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA, recorded_signals
 from tenbaud.recording.envelope import Curve
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.overview import FIELDS, Columns, Overview, marks_of, unpacked
+from tenbaud.recording.overview import FIELDS, Overview, marks_of, unpacked
 from tenbaud.recording.pose import draw_poses, has_poses
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
-from tenbaud.recording.rows import Row
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure
 
 if TYPE_CHECKING:
@@ -208,16 +207,13 @@ def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, s
         # The head, which says what is recorded, comes before the rows.
         overview = overview or Overview(recorded_signals(stream.metadata.get(RUN_METADATA, {})))
         for topic, (times, rows) in block.items():
-            names = {one.name for one in stream.channels[topic].fields}
-            overview.add(topic, times, _columns_of(rows, names))
+            there = {one.name for one in stream.channels[topic].fields}
+            names = [name for name in FIELDS[topic] if name in there]
+            overview.add(topic, times, {name: [row[name] for row in rows] for name in names})
     metadata = stream.metadata.get(RUN_METADATA, {})
     overview = overview or Overview(recorded_signals(metadata))
     overview.finish()
     return overview, metadata
-
-
-def _columns_of(rows: Sequence[Row], names: set[str]) -> Columns:
-    return lambda name: [row[name] for row in rows] if name in names else None
 
 
 def _cuts(impairments: str, end_s: float) -> list[tuple[float, float]]:

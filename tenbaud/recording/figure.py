@@ -12,7 +12,6 @@ import numpy as np
 
 from channel.codec.signals import Signal
 from channel.line.impairments import parse_impairments
-from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA, recorded_signals
 from tenbaud.recording.envelope import Curve
 from tenbaud.recording.errors import RecordingError
@@ -36,6 +35,7 @@ STEPS = {"drawstyle": "steps-post"}
 
 SHARES_DRAWN = 100
 """Stretches of a flight of which the share of the bits is drawn."""
+FLIGHT_DOTS_PER_INCH = 150
 DRAWN_MAX = 8
 """Groups of outputs or of inputs that have a panel."""
 
@@ -82,21 +82,6 @@ class _Flight:
         return any(not np.isnan(self.curves[name][place][1]).all() for place in places)
 
 
-def draw_flight(
-    transmitter: Path, receiver: Path | None, output: Path, title: str, usual: Curve | None = None
-) -> None:
-    """Draw a flight that was just flown into the PNG file `output`.
-
-    `usual` is its first output over 1000 bit/s.
-    An output is the true one where the rig knows it, else the measured one; the errors are taken
-    from it. The receiver's recording adds the reference. Raises RecordingError if the
-    transmitter's recording holds no flight.
-    """
-    figure = draw_run(transmitter, receiver, title, True, usual)
-    with whole_file(output) as stream:
-        figure.savefig(stream, dpi=150, format="png")
-
-
 def draw_run(
     transmitter: Path | None,
     receiver: Path | None,
@@ -104,8 +89,10 @@ def draw_run(
     own: bool = False,
     usual: Curve | None = None,
 ) -> Figure:
-    """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
+    """Return the figure of a flight. Raises RecordingError where no transmitter recorded a tick.
 
+    An output is the true one where the rig knows it, else the measured one; the errors are taken
+    from it. The receiver's recording adds the reference. `usual` is the first output over 1000 bit/s.
     `own`: the recordings were made just now, and what they store for the figure is trusted.
     """
     if transmitter is None:

@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
 from typing import BinaryIO
 
-from tenbaud.files.whole import write_error
+from tenbaud.files.whole import whole_path
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings, in_use
 from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
-from tenbaud.recording.reader import MessageStream, open_recording
+from tenbaud.recording.reader import MessageStream, Recording, open_recording
 from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
 
 RECOVERED_NOTE = "recovered"
@@ -78,22 +77,21 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
     target = output or path
     kept = None if output is not None else path.with_name(f"{path.stem}.cut{path.suffix}")
     with _held(path) as damaged:
+        found = Recording(path)
+        if found.complete:
+            tables = found.topics.values()
+            last_ns = max((table.last_time_ns for table in tables), default=0)
+            return Recovered(path, None, sum(map(len, tables)), last_ns)
+        for taken in (output, kept):
+            if taken is not None and os.path.lexists(taken):
+                raise _exists(taken)
         stream = MessageStream(path)
-        try:
-            with _unfinished(target) as (whole, unfinished):
+        with whole_path(target) as part:
+            with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as whole:
                 rows, last_ns = _copy(stream, whole)
-                if stream.complete:
-                    return Recovered(path, None, rows, last_ns)
-                for taken in (output, kept):
-                    if taken is not None and os.path.lexists(taken):
-                        raise _exists(taken)
-                unfinished.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
-                os.fsync(whole.fileno())
-                if kept is not None:
-                    _keep(path, kept)
-                unfinished.replace(target)
-        except OSError as error:
-            raise write_error(target, error) from error
+            part.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
+            if kept is not None:
+                _keep(path, kept)
     return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
 
 
@@ -114,18 +112,6 @@ def _held(path: Path) -> Iterator[BinaryIO]:
         if not os.path.samestat(os.fstat(stream.fileno()), path.lstat()):
             raise RecordingError(f"{path} was replaced while it was opened. Look at it and try again.")
         yield stream
-
-
-@contextlib.contextmanager
-def _unfinished(target: Path) -> Iterator[tuple[BinaryIO, Path]]:
-    """A new file beside `target`, under a name that nobody else has; removed if it is still there."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".unfinished", dir=target.parent)
-    path = Path(name)
-    try:
-        with open(handle, "wb") as stream:
-            yield stream, path
-    finally:
-        path.unlink(missing_ok=True)
 
 
 def _keep(path: Path, kept: Path) -> None:
@@ -164,9 +150,7 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
     if stream.holes:
         writer.add_metadata(HOLES_METADATA, packed_holes(stream.holes))
     end = stream.metadata.get(END_METADATA, {"rows_written": str(rows)})
-    if not stream.complete:
-        end = {**end, "rows_recovered": str(rows), RECOVERED_NOTE: RECOVERED_TEXT}
+    end = {**end, "rows_recovered": str(rows), RECOVERED_NOTE: RECOVERED_TEXT}
     writer.add_metadata(END_METADATA, end)
     writer.finish()
-    output.flush()
     return rows, last_ns

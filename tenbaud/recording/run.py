@@ -14,7 +14,6 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tenbaud.files.whole import whole_file
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.recorded import RecordedRun
 from tenbaud.recording.steps import SETTLING_BAND
@@ -108,13 +107,12 @@ class Run(RecordedRun):
 
     def plot(self, output: str | Path | None = None) -> Figure:
         """Draw the flight as `flight.png` shows it; also into the file `output`, if given."""
-        from tenbaud.recording.figure import draw_run
+        from tenbaud.recording.figure import FLIGHT_DOTS_PER_INCH, draw_run
+        from tenbaud.recording.style import save
 
         figure = draw_run(self._files.get("transmitter"), self._files.get("receiver"), self._title())
         if output is not None:
-            path = Path(output)
-            with whole_file(path) as stream:
-                figure.savefig(stream, dpi=150, format=path.suffix[1:] or "png")
+            save(figure, [Path(output)], FLIGHT_DOTS_PER_INCH)
         return figure
 
     def _title(self) -> str:

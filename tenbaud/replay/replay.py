@@ -13,9 +13,8 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.pack import Packed, pack
 from tenbaud.replay.record import FlightRecord, epochs_of
-from tenbaud.replay.refly import Reflown
+from tenbaud.replay.refly import Reflown, flown_again
 from tenbaud.replay.rows import Topic
-from tenbaud.replay.stepped import flown_again
 from tenbaud.replay.symbols import Unpacked
 
 

@@ -18,6 +18,7 @@ from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import Row
 from tenbaud.recording.table import Table
 from tenbaud.sentences import events
+from tenbaud.sentences.flown import lockstep_text
 
 EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20
@@ -29,7 +30,8 @@ def describe_text(path: Path) -> str:
     Raises RecordingError if there is none or a file is not a recording.
     """
     recordings = [Recording(file) for file in find_recordings(path)]
-    parts = [_headline(path), *map(_text, recordings)]
+    printed: set[object] = set()
+    parts = [_headline(path), *[_text(recording, printed) for recording in recordings]]
     if not all(recording.complete for recording in recordings):
         parts.append(f"`tenbaud recover {path}` repairs truncated or damaged files")
     return printable("\n\n".join(part for part in parts if part))
@@ -41,11 +43,11 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 
 def _headline(path: Path) -> str:
-    """Return `summary.json` in one line; empty without it."""
+    """Return `summary.json` in one line, or two with a narrow downlink; empty without it."""
     summary = read_summary(RunFolder(path).summary)
     if not summary:
         return ""
-    parts = [f"{summary.get('preset')}: {summary.get('outcome')}"]
+    parts, certain = [f"{summary.get('preset')}: {summary.get('outcome')}"], ""
     for name, form in (
         ("duration_s", "{:g} s"),
         ("coder_bits_up", "{:.12g} bits up"),
@@ -55,7 +57,11 @@ def _headline(path: Path) -> str:
         value = summary.get(name)
         if isinstance(value, int | float) and (value or name not in ("erasures", "desyncs")):
             parts.append(form.format(value))
-    return ", ".join(part for part in parts if part)
+    if (narrow := summary.get("narrow") or {}).get("samples_confirmed"):
+        parts.append(f"{summary['coder_bits_down']:.12g} bits down")
+        parts.append(f"{narrow['samples_confirmed']} of {summary['samples']} samples confirmed")
+        certain = f"\n  {lockstep_text(narrow)}"
+    return ", ".join(part for part in parts if part) + certain
 
 
 def _plain(recording: Recording) -> dict[str, Any]:
@@ -87,7 +93,8 @@ def _plain(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _text(recording: Recording) -> str:
+def _text(recording: Recording, printed: set[object]) -> str:
+    """Return a recording as text; of what is `printed` already, for the other end, the names alone."""
     plain, state = _plain(recording), "complete"
     if not recording.complete:
         state = "damaged: these are the rows that are whole"
@@ -99,10 +106,17 @@ def _text(recording: Recording) -> str:
     if plain["error"] is not None:
         lines.append(f"  {plain['error']}")
     lines += [f"  {note}" for note in plain["notes"]]
+    same = [item for item in recording.metadata.items() if item in printed]
     for name, value in recording.metadata.items():
-        lines.extend(_metadata_lines(name, value))
+        if (name, value) not in printed:
+            lines.extend(_metadata_lines(name, value))
+    if same:
+        lines.append(f"  as above: {', '.join(name for name, _ in same)}")
     for topic, table in recording.topics.items():
-        lines += ["", f"  {topic}: {_span(table)}", *_field_lines(table.channel)]
+        known = table.channel in printed
+        lines += ["", f"  {topic}: {_span(table)}{', fields as above' if known else ''}"]
+        lines.extend([] if known else _field_lines(table.channel))
+    printed |= {*recording.metadata.items(), *[one.channel for one in recording.topics.values()]}
     if plain["events"]:
         total, shown = len(recording.topics[EVENT_TOPIC]), len(plain["events"])
         lines += ["", "  events" if shown == total else f"  the first {shown} of {total} events"]

@@ -91,7 +91,7 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
                 rows, last_ns = _copy(stream, whole)
             part.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
             if kept is not None:
-                _keep(path, kept)
+                _keep(path, kept, damaged)
     return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
 
 
@@ -114,13 +114,15 @@ def _held(path: Path) -> Iterator[BinaryIO]:
         yield stream
 
 
-def _keep(path: Path, kept: Path) -> None:
-    """Give the damaged file its second name; RecordingError if that is taken meanwhile."""
+def _keep(path: Path, kept: Path, damaged: BinaryIO) -> None:
+    """Give the damaged file its second name and close it; RecordingError if the name is taken."""
     try:
         kept.hardlink_to(path)
+        damaged.close()
     except FileExistsError:
         raise _exists(kept) from None
     except OSError:  # a file system without hard links
+        damaged.close()
         path.rename(kept)
 
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from starlette.datastructures import QueryParams
-from starlette.responses import HTMLResponse
-
 from tenbaud.view.access import COOKIE, Access, Grant, is_same_origin
 
 if TYPE_CHECKING:
+    from starlette.responses import HTMLResponse
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 GRANT = "tenbaud.grant"
@@ -87,6 +85,8 @@ class Gate:
 
     def _entering(self, scope: Scope) -> Grant | None:
         """Return what the secret in a printed address allows; None when this is no such address."""
+        from starlette.datastructures import QueryParams
+
         if scope["type"] != "http" or scope["path"] != "/" or scope["method"] not in SAFE_METHODS:
             return None
         return self._access.holder_of(QueryParams(scope["query_string"]).get("key", ""))
@@ -121,4 +121,6 @@ def _with_headers(send: Send) -> Send:
 
 def _page(head: str, body: str, status: int) -> HTMLResponse:
     """Return a small page of our own; a WebSocket that is asked for is refused with it."""
+    from starlette.responses import HTMLResponse
+
     return HTMLResponse(PAGE.format(head=head, body=body), status, {"cache-control": "no-store"})

@@ -94,7 +94,7 @@ def _plain(recording: Recording) -> dict[str, Any]:
 
 
 def _text(recording: Recording, printed: set[object]) -> str:
-    """Return a recording as text; of what is `printed` already, for the other end, the names alone."""
+    """Return a recording as text; of what the other end's has `printed`, only the names."""
     plain, state = _plain(recording), "complete"
     if not recording.complete:
         state = "damaged: these are the rows that are whole"

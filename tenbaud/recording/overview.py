@@ -259,13 +259,14 @@ class OverviewRecorder:
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Take one row, filed at tick 0 where it came before."""
         topic = channel.topic
-        if topic not in FIELDS:
-            return
-        if topic not in self._rows:
+        held = self._rows.get(topic)
+        if held is None:
+            if topic not in FIELDS:
+                return
             self._names[topic] = [one.name for one in channel.fields]
-            self._rows[topic] = ([], [])
-        times, rows = self._rows[topic]
-        times.append(max(0, time_ns))
+            held = self._rows[topic] = ([], [])
+        times, rows = held
+        times.append(time_ns if time_ns > 0 else 0)
         rows.append(row)
         if len(rows) >= BLOCK_ROWS:
             self._take(topic)

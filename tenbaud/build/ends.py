@@ -26,10 +26,10 @@ from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.downlink import with_codec
 from tenbaud.build.first_contact import require_safe
-from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
+from tenbaud.build.flight import Agreement, ticks_of
 from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
-from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
+from tenbaud.build.liveness import overtaking_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, begin_from, build_references, values_of
 from tenbaud.build.rig import build_rig
@@ -240,9 +240,8 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
     On a recording there is nothing to protect: only a receiver that is gone ends the flight.
     """
     section = agreement.config.transmitter
-    terms = agreement.terms
     recorded = section.rig == "replay"
-    timeout_ticks = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)
+    timeout_ticks = agreement.watchdog_ticks
     if recorded:
         timeout_ticks = ticks_of(agreement.config.link.peer_timeout_s, agreement.config)
     return GuardSettings(

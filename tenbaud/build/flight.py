@@ -17,7 +17,7 @@ from channel.registry import RegistryError
 from receiver.controllers.base import Controller
 from tenbaud.build.codec import build_codec
 from tenbaud.build.downlink import build_two_way, narrowed_terms
-from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
+from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import longest_period_s
 from tenbaud.build.signals import build_limits, initial_command
@@ -69,6 +69,11 @@ class Agreement:
     def trip(self) -> RoundTrip:
         """Return how long commands take, as far as the configuration knows."""
         return round_trip(self.terms, self.faults, self.clock)
+
+    @property
+    def watchdog_ticks(self) -> int:
+        """Return the watchdog's time-out, configured or chosen."""
+        return watchdog_ticks(watchdog_wanted_s(self.config), self.terms, self.trip)
 
     @property
     def desyncs_expected(self) -> float:

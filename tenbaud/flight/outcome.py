@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import signal
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
 from channel.protocol.endings import End, Ending
 from tenbaud.files.whole import WriteError
-from tenbaud.flight.verdict import NotFlown
 from tenbaud.sentences import endings
 
 
@@ -26,6 +25,19 @@ class ExitCode(IntEnum):
     NOT_FLOWN = 7
     NOT_WRITTEN = 8
     INTERRUPTED = 130
+
+
+class NotFlown(StrEnum):
+    """The faults of a flight."""
+
+    NEVER_LOCKED = "never locked"
+    REJOINING = "rejoins without end"
+    UNCONFIRMED = "too few samples confirmed"
+    CONTROLLER = "the controller failed"
+    FELL = "the plant fell"
+    GUARD_DOWN = "guard down"
+    NO_COMMANDS = "no commands in time"
+    NO_WORDS = "no words"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from tenbaud.build.ends import build_line, build_transmitter, build_uplink
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, farewell_of
-from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
+from tenbaud.flight.verdict import FlightCounts, verdict
 from tenbaud.log.units import turn_in
 from tenbaud.sentences import endings, events
 from transmitter.endpoint import TransmitterEndpoint
@@ -165,13 +165,8 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
 
 def _not_flown(run: TransmitterRun) -> Outcome | None:
     """Return the outcome of a flight that went to its end without flying; None: it has flown."""
-    counts = flight_counts(run)
-    faults = faults_of(counts)
-    if not faults:
-        return None
     asked = {why.name.lower(): number for why, number in run.node.session.rejoins_asked.items()}
-    text = verdict_text(faults, counts, settings_of(run.agreement), asked)
-    return Outcome(ExitCode.NOT_FLOWN, text, faults)
+    return verdict(flight_counts(run), run.agreement, asked)
 
 
 LATEST_CERTAIN_SAMPLES = 64

@@ -28,7 +28,7 @@ from tenbaud.build.controllers import build_controller, rate_states
 from tenbaud.build.references import ANNOUNCED_SAMPLES_MAX
 from tenbaud.build.set_point_ranges import set_point_ranges
 from tenbaud.config.downlink import DownlinkSection, StateLawSection
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 
 MIRRORED = ("pid", "state_feedback")
@@ -71,13 +71,11 @@ def build_two_way(
     """
     if terms.downlink != "narrow":
         return BuiltDownlink(None, None)
-    try:
+    with config_errors("the narrow downlink"):
         layout = _layout(config.downlink, terms)
         build = _mirrored if terms.is_mirrored else _coded
         scheme, description = build(config, codec, terms, layout, controller)
         two_way = two_way_of(codec, terms, scheme, layout)
-    except ValueError as error:
-        raise ConfigError(f"the narrow downlink: {error}") from error
     return BuiltDownlink(two_way, {"layout": asdict(layout), **description})
 
 

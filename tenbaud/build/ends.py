@@ -35,7 +35,7 @@ from tenbaud.build.references import References, begin_from, build_references, v
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS, model_kind
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 from transmitter.endpoint import TransmitterNode
 from transmitter.guard import Guard, GuardSettings
@@ -97,7 +97,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
     if not codec.uses_rates:
         return None
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
-    try:
+    with config_errors(f"coder.kind = {config.coder.kind!r}"):
         kind = model_kind(config.model)
         # A coder that was designed for a plant stands near its limit: it needs the best view of it.
         is_designed = isinstance(codec.coder, DirectionCoder) and kind is not None and kind.linear
@@ -111,8 +111,6 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
             steps = output_steps(config, agreement.signals)
             return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
-    except ValueError as error:
-        raise ConfigError(f"coder.kind = {config.coder.kind!r}: {error}") from error
 
 
 def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
@@ -134,10 +132,8 @@ def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
     """Return the codec, corrupted as configured; `live`: it may be corrupted in flight."""
     if not text:
         return SabotagedCodec(codec) if live else codec
-    try:
+    with config_errors():
         return SabotagedCodec(codec, parse_sabotage(text))
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
 
 
 def build_receiver(

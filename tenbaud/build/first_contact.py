@@ -92,7 +92,7 @@ def is_emulated(config: FlightConfig, signals: Signals) -> bool:
 
 def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[str]:
     """Yield what a flight lacks, a line each."""
-    soft = soft_limits(config, signals) or (math.inf,) * len(signals.outputs)
+    soft = soft_limits(config, signals)
     open_outputs = [
         one.name for one, most in zip(signals.outputs, soft, strict=True) if most == math.inf
     ]
@@ -111,8 +111,7 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
     for place, (output, section) in enumerate(reference_sections(config, signals)):
         gentle = gentle_limit(output, soft[place])
         for field, what in (("set_point_max", ""), ("set_point_slew_per_s", "/s")):
-            given = per_output(f"limits.{field}", getattr(config.limits, field), signals)
-            value = given[place] if given else math.inf
+            value = per_output(f"limits.{field}", getattr(config.limits, field), signals)[place]
             if section is not None and not value <= gentle:
                 now = "none" if value == math.inf else f"{value:g} {output.unit}{what}"
                 yield (
@@ -136,8 +135,8 @@ def first_settings(
 
     `soft` are soft limits that were found out, infinite where nothing is known.
     """
-    known = soft or soft_limits(config, signals) or (math.inf,) * len(signals.outputs)
-    stops: Mapping[str, tuple[float, float]] = getattr(config.model, "stops", {})
+    known = soft or soft_limits(config, signals)
+    stops = config.model.stops
     limits = [
         most if most < math.inf else _first_soft_limit(one, stops.get(one.name))
         for one, most in zip(signals.outputs, known, strict=True)
@@ -167,11 +166,10 @@ def as_options(settings: Mapping[str, Any]) -> str:
 def motor_lines(config: FlightConfig) -> list[str]:
     """Return the limits of a flight with motors, a line each, for the person who stands beside them."""
     signals = configured_signals(config)
-    free = (math.inf,) * len(signals.outputs)
     columns = (
-        soft_limits(config, signals) or free,
-        per_output("limits.set_point_max", config.limits.set_point_max, signals) or free,
-        per_output("limits.set_point_slew_per_s", config.limits.set_point_slew_per_s, signals) or free,
+        soft_limits(config, signals),
+        per_output("limits.set_point_max", config.limits.set_point_max, signals),
+        per_output("limits.set_point_slew_per_s", config.limits.set_point_slew_per_s, signals),
     )
     lines = []
     for one, soft, largest, slew in zip(signals.outputs, *columns, strict=True):

@@ -20,7 +20,7 @@ from tenbaud.build.signals import (
     safe_command,
 )
 from tenbaud.config.kinds import PLANTS
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig, TransmitterSection
@@ -62,7 +62,7 @@ def build_device(config: FlightConfig, output: bool, signals: Signals | None = N
         rate_max_rad_per_s=section.bridge.rate_max_rad_per_s,
         output=output,
     )
-    try:
+    with config_errors(f"transmitter.{section.rig}"):
         match section.rig:
             case "serial":
                 return _build_serial(config, settings, signals)
@@ -70,8 +70,6 @@ def build_device(config: FlightConfig, output: bool, signals: Signals | None = N
                 return _build_quarc(config, settings, signals)
             case "hil":
                 return _build_hil(config, settings, signals)
-    except ValueError as error:
-        raise ConfigError(f"transmitter.{section.rig}: {error}") from error
     raise ConfigError(
         f"rig = {section.rig!r} is not a device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
         "quarc:HOST:PORT, quarc-server:PORT or hil"
@@ -112,10 +110,8 @@ def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> Plan
     section = config.transmitter.plant
     disturbance = None
     if section.disturbance:
-        try:
+        with config_errors("transmitter.plant.disturbance"):
             disturbance = parse_disturbance(section.disturbance, step_s, config.seed)
-        except ValueError as error:
-            raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
     context = PlantContext(
         step_s,
         config.seed,
@@ -139,10 +135,8 @@ def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> Plan
 
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
     """Return the pitch axis."""
-    try:
+    with config_errors("transmitter.plant.disturbance"):
         (disturbance,) = context.disturbances(1) or (None,)
-    except ValueError as error:
-        raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
     return PitchPlant(
         nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,

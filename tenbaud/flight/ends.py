@@ -5,12 +5,11 @@ from __future__ import annotations
 import gc
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.codec.codec import Word
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -28,10 +27,12 @@ from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import (
+    counted,
     gap_part,
     link_part,
     narrow_part,
     receiver_part,
+    recording_part,
     transmitter_part,
 )
 from tenbaud.flight.trouble import Trouble
@@ -44,7 +45,6 @@ from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences.flown import Summary
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
-from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from transmitter.loops.virtual import LinkPeer
 
 SWITCH_INTERVAL_S = 0.0002
@@ -179,9 +179,17 @@ def run_in_memory(
         run = transmit.prepare(agreement, up.recorder, DATAGRAM)
         endpoint = build_receiver(agreement, down.recorder, DATAGRAM, references=down.steering)
         obeyed = down.fly_receiver(endpoint, stop)
-        live = up.fly_transmitter(run, stop, lambda: _obey(obeyed))
+        # Also while the flight is paused.
+        live = up.fly_transmitter(run, stop, obeyed)
+
+        def act(tick: int) -> None:
+            obeyed()
+            live.at_tick(tick)
+            if drawing is not None:
+                drawing.at_tick(tick)
+
         if viewing.endpoints or drawing is not None:
-            run.node.before_every_tick(_each_tick(live, obeyed, drawing))
+            run.node.before_every_tick(act)
         with (
             up.publishing(lambda tap: TransmitterComposer(run, tap, live)),
             down.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, obeyed)),
@@ -198,25 +206,6 @@ def run_in_memory(
         upper = transmitter_part(run, outcome)
         lower = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(upper, recorder), lower
-
-
-def _obey(receiver: LiveReceiver) -> None:
-    """Have the receiver's commands take hold, also while the flight is paused."""
-    receiver()
-
-
-def _each_tick(
-    live: LiveTransmitter, obeyed: LiveReceiver, drawing: NotebookDrawing | None
-) -> Callable[[int], None]:
-    """Return what both ends have done before every tick of a flight that is looked at."""
-
-    def act(tick: int) -> None:
-        _obey(obeyed)
-        live.at_tick(tick)
-        if drawing is not None:
-            drawing.at_tick(tick)
-
-    return act
 
 
 def open_recorder(
@@ -251,27 +240,26 @@ def open_recorder(
 
 def transmitter_status(run: TransmitterRun) -> Status:
     """Return the status of a running transmitter, for people."""
-    node = run.node
+    node, session = run.node, run.node.session
     coder = run.agreement.codec.coder
     tick_s = run.agreement.terms.tick_ns / 1e9
+    # Copied in one go: the flight's thread may add to it meanwhile.
+    words = tuple(node.scores.last_words)
     return {
         "role": "transmitter",
-        "phase": node.session.phase.value,
+        "phase": session.phase.value,
         "tick": node.tick,
         "of_ticks": run.agreement.flight_ticks,
         "time_s": node.tick * tick_s,
         "outputs": outputs_status(
             run.agreement.signals,
             [one.last for one in node.scores.outputs],
-            coder.ranges(node.session.confirmed_state.coder),
+            coder.ranges(session.confirmed_state.coder),
             [one.last_coded_error for one in node.scores.outputs],
         ),
-        "erasures": node.session.counts["erasures"],
-        "desyncs": node.session.counts["desyncs"],
-        "digest_checks": node.session.counts["digest_checks"],
-        "rejoins": node.session.counts["rejoins"],
-        # Copied in one go: the flight's thread may add to it meanwhile.
-        **_tape(tuple(node.scores.last_words)),
+        **counted(session, "erasures", "desyncs", "digest_checks", "rejoins"),
+        "words": [word for word, _ in words],
+        "about": [about for _, about in words],
         "guard": node.guard.state.value,
         "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
@@ -291,10 +279,6 @@ def _narrow(run: TransmitterRun) -> Status:
         "baud": run.endpoint.down_baud.baud,
     }
     return {"narrow": part["narrow"] | now}
-
-
-def _tape(words: Sequence[tuple[Word, tuple[int, ...] | None]]) -> Status:
-    return {"words": [word for word, _ in words], "about": [about for _, about in words]}
 
 
 def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
@@ -365,9 +349,4 @@ def _guarded(fly: Callable[[], Outcome]) -> Outcome:
 def _with_recording(summary: Summary, recorder: McapRecorder) -> Summary:
     """Close the recording and add its outcome."""
     recorder.close()
-    return {
-        **summary,
-        "recording_rows": recorder.rows_written,
-        "recording_rows_lost": recorder.rows_dropped,
-        "recording_error": recorder.error,
-    }
+    return summary | recording_part(recorder)

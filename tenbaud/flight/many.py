@@ -29,7 +29,7 @@ from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.rate_limited_log import RateLimitedLog
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
-from tenbaud.flight.summary import receiver_part
+from tenbaud.flight.summary import receiver_part, recording_part
 from tenbaud.recording.folder import RunFolder, make_numbered
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
@@ -216,9 +216,7 @@ class ManyHost:
                 "folder": str(flight.folder.path),
                 **receiver_part(flight.agreement, endpoint, outcome),
                 "messages_dropped": served.dropped,
-                "recording_rows": flight.recorder.rows_written,
-                "recording_rows_lost": flight.recorder.rows_dropped,
-                "recording_error": flight.recorder.error,
+                **recording_part(flight.recorder),
             }
             if flight.recorder.error is not None:
                 self.counts["not_written"] += 1

@@ -43,7 +43,8 @@ def write_up(
         problems.append(outcome_of(error))
     if draw:
         try:
-            draw_figure(folder, figure_title(config, summary), usual)
+            plant, rate_baud = summary.get("plant", ""), config.channel.rate_baud
+            draw_figure(folder, f"{config.preset}: {plant}, {rate_baud:g} bit/s", usual)
         except (RecordingError, WriteError) as error:
             code = ExitCode.NOT_WRITTEN if isinstance(error, WriteError) else ExitCode.OK
             problems.append(Outcome(code, f"no figure was drawn: {error}"))
@@ -95,11 +96,6 @@ def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> No
 
     receiver = folder.receiver if folder.receiver.is_file() else None
     draw_flight(folder.transmitter, receiver, folder.figure, title, usual)
-
-
-def figure_title(config: FlightConfig, summary: Summary) -> str:
-    """Return the title of a flight's figure."""
-    return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
 
 
 def show_summaries(

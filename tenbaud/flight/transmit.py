@@ -86,15 +86,26 @@ def _fly(
             run.ticks = flight.run(run.agreement.flight_ticks) - first
             run.rejoin_bytes = _control_bytes(run) - greeting_bytes
             present = peer_present()
-            ending = _Ending(run, _outcome(run, present), present)
-            flight.finish(ending.farewell)
+            outcome = _outcome(run, present)
+
+            def farewell() -> End:
+                """Settle the outcome, now that the last echoes are in: only a difference counts."""
+                nonlocal outcome
+                if outcome.code is ExitCode.OK:
+                    outcome = _desync_outcome(run) or outcome
+                # Where the other end is gone, that is the cause of everything that the counts show.
+                if outcome.code is ExitCode.OK or (present and _went_to_its_end(run)):
+                    outcome = _not_flown(run) or outcome
+                return farewell_of(outcome)
+
+            flight.finish(farewell)
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = inlet.meter.wire_bytes
             run.extra["malformed"] = inlet.malformed
             if figures := rig.figures():
                 run.extra["rig"] = figures
-    return ending.outcome
+    return outcome
 
 
 def _check_welcome(run: TransmitterRun) -> None:
@@ -109,33 +120,12 @@ def _control_bytes(run: TransmitterRun) -> int:
     return run.uplink.meter.control_bytes + run.endpoint.inlet.meter.control_bytes
 
 
-class _Ending:
-    """The outcome of a flight: as it was after the last tick, then with what the last echoes tell.
-
-    Of these, only that the copies differ counts: a flight that was flown to its end is over.
-    """
-
-    def __init__(self, run: TransmitterRun, outcome: Outcome, peer_present: bool) -> None:
-        self.outcome = outcome
-        self._run = run
-        self._peer_present = peer_present
-
-    def farewell(self) -> End:
-        """Settle the outcome, now that the last echoes are in; return the ending for the receiver."""
-        if self.outcome.code is ExitCode.OK:
-            self.outcome = _desync_outcome(self._run) or self.outcome
-        # Where the other end is gone, that is the cause of everything that the counts show.
-        if self.outcome.code is ExitCode.OK or (self._peer_present and self._went_to_its_end):
-            self.outcome = _not_flown(self._run) or self.outcome
-        return farewell_of(self.outcome)
-
-    @property
-    def _went_to_its_end(self) -> bool:
-        """Return whether the flight ended only because its time was over, in any state."""
-        run, session, guard = self._run, self._run.node.session, self._run.node.guard
-        harmless = not guard.stopped or guard.timed_out
-        flown = run.ticks >= run.agreement.flight_ticks
-        return flown and harmless and session.desync is None and session.phase is not Phase.ENDED
+def _went_to_its_end(run: TransmitterRun) -> bool:
+    """Return whether a flight ended only because its time was over, in any state."""
+    session, guard = run.node.session, run.node.guard
+    harmless = not guard.stopped or guard.timed_out
+    flown = run.ticks >= run.agreement.flight_ticks
+    return flown and harmless and session.desync is None and session.phase is not Phase.ENDED
 
 
 def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:

@@ -92,7 +92,7 @@ class TelemetryEnd:
         self.security = None if security is None else _for_viewers(security, agreement.live)
 
     def fly_transmitter(
-        self, run: TransmitterRun, stop: Stop, keep_alive: Callable[[], None] | None = None
+        self, run: TransmitterRun, stop: Stop, keep_alive: Callable[[], object] | None = None
     ) -> LiveTransmitter:
         """Return what obeys commands for this transmitter, hung into its loop where it has work."""
         live = LiveTransmitter(run, self.queue, stop, self.pace, keep_alive or (lambda: None))
@@ -158,7 +158,7 @@ def steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
     references = build_references(agreement.config, agreement.signals, agreement.codec.model)
-    stops: dict[str, tuple[float, float]] = getattr(agreement.config.model, "stops", {})
+    stops = agreement.config.model.stops
     words = said_by_words(agreement.two_way)
     found: list[SteeredReference | None] = []
     for place, (output, one) in enumerate(zip(agreement.signals.outputs, references, strict=True)):

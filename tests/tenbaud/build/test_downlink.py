@@ -23,7 +23,7 @@ from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import build_references
 from tenbaud.config.load import ConfigError, load_config
-from tenbaud.telemetry.end import _steered
+from tenbaud.telemetry.end import steered
 
 MS = 1_000_000
 
@@ -245,7 +245,7 @@ def test_a_law_from_outside_is_mirrored_where_it_keeps_to_the_rules() -> None:
 
 def test_a_set_point_by_hand_is_held_to_the_range_of_its_words() -> None:
     agreement = replace(agreed(), live=True)
-    steering = _steered(agreement)
+    steering = steered(agreement)
     assert steering is not None
     assert steering[0] is not None
     one = mirrored(agreement).ranges[0]

@@ -48,7 +48,7 @@ def _parameter(name: str, hint: Any, default: Any) -> inspect.Parameter:
 
 
 def _parameters(group: Any) -> Iterator[inspect.Parameter]:
-    """Yield the option of each field; a switch that is off has no `--no-` form."""
+    """Yield the option of each field; a plain switch that is off has no `--no-` form."""
     hints = get_type_hints(group, include_extras=True)
     texts = {name: text for kind in group.__mro__ for name, text in _texts(kind).items()}
     for one in fields(group):
@@ -60,11 +60,13 @@ def _hint(name: str, hint: Any, default: Any, texts: dict[str, str]) -> Any:
     """Return the annotation of an option, with its text as help."""
     if name not in texts:
         return hint
-    kind, info = (*get_args(hint), None)[:2] if get_origin(hint) is Annotated else (hint, None)
-    info = typer.Option() if info is None else copy(info)
+    if get_origin(hint) is Annotated:
+        kind, info = get_args(hint)
+        info = copy(info)
+    else:
+        switch = hint is bool and not default
+        kind, info = hint, typer.Option(*[f"--{name.replace('_', '-')}"] * switch)
     info.help = texts[name]
-    if kind is bool and not default and not info.param_decls:
-        info.param_decls = (f"--{name.replace('_', '-')}",)
     return Annotated[kind, info]
 
 

@@ -69,14 +69,6 @@ Settings = Annotated[
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
-Mismatches = Annotated[
-    list[float] | None,
-    typer.Option(
-        "--mismatch",
-        help="Model mismatch of the simulated plant, 10% or 0.1; repeatable, one flight each. Not "
-        "given: as configured; 10% if none of --preset, --config, --rig or a plant setting is given.",
-    ),
-]
 Mismatch = Annotated[
     float | None,
     typer.Option(help="Model mismatch of the simulated plant, 10% or 0.1."),
@@ -116,17 +108,6 @@ TakeOver = Annotated[
 Pace = Annotated[
     float | None,
     typer.Option(min=0.05, max=1e6, help="Virtual clock: maximum speed as a multiple of real time."),
-]
-View = Annotated[
-    bool,
-    typer.Option(
-        "--view",
-        help="Serve a live page to watch, control and disturb the flight. It flies in "
-        "real time (--pace for other speeds) for an hour, or --duration, or until Ctrl-C.",
-    ),
-]
-ViewPort = Annotated[
-    int, typer.Option(min=0, max=65535, help="Port of the live page; 0: any free one.")
 ]
 OpenBrowser = Annotated[
     bool, typer.Option("--open", help="Open the live page in the browser of this machine.")

@@ -17,7 +17,6 @@ from channel.codec.downlink.laws import MirroredFeedback, MirroredLoop, Mirrored
 from channel.codec.downlink.layout import Layout, symbols_carried
 from channel.codec.downlink.machine import TwoWay
 from channel.codec.downlink.mirrored import Law, MirroredLaw
-from channel.codec.downlink.scheme import Scheme
 from channel.codec.laws import FeedbackLaw
 from channel.line.impairments import parse_impairments
 from channel.protocol.terms import Terms
@@ -75,22 +74,16 @@ def build_two_way(
         layout = _layout(config.downlink, terms)
         build = _mirrored if terms.is_mirrored else _coded
         scheme, description = build(config, codec, terms, layout, controller)
-        two_way = two_way_of(codec, terms, scheme, layout)
+        two_way = TwoWay(
+            codec,
+            scheme,
+            layout,
+            terms.lead_ticks,
+            terms.initial_command,
+            terms.limits.command_max,
+            terms.limits.slew_per_tick,
+        )
     return BuiltDownlink(two_way, {"layout": asdict(layout), **description})
-
-
-def two_way_of(codec: Codec, terms: Terms, scheme: Scheme, layout: Layout) -> TwoWay:
-    """Return the state machine of a codec's flight on these terms."""
-    limits = terms.limits
-    return TwoWay(
-        codec,
-        scheme,
-        layout,
-        terms.lead_ticks,
-        terms.initial_command,
-        limits.command_max,
-        limits.slew_per_tick,
-    )
 
 
 def with_codec(two_way: TwoWay | None, codec: Codec) -> TwoWay | None:

@@ -186,24 +186,15 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
             _check_command(config, controller, parts)
 
 
-def check_rig(config: FlightConfig, accept_risk: bool = False, parts: Parts | None = None) -> bool:
+def check_flight(agreement: Agreement, accept_risk: bool = False) -> bool:
     """Return whether motors of a real rig will turn; for a process that opens the rig.
 
-    LinkError where a serial port of the rig is not there, ConfigError where its motors would turn
-    without what `require_safe` asks for.
+    Everything is checked before it starts. ConfigError for parts that cannot be built, a sabotage at a
+    sample that the flight does not have, and motors that would turn without what `require_safe` asks
+    for; LinkError where a serial port of the rig is not there.
     """
-    if config.transmitter.rig == "serial":
-        from channel.links.serial.port import check_port
-
-        section = config.transmitter.serial
-        for port in filter(None, (section.port, section.motor_port)):
-            check_port(port, insecure=True)
-    return require_safe(config, accept_risk, parts)
-
-
-def check_sabotage(agreement: Agreement) -> None:
-    """Raise ConfigError for a sabotage at a sample that the flight does not have."""
     config = agreement.config
+    check_parts(config, agreement.parts)
     samples = agreement.flight_ticks // agreement.terms.ticks_per_sample
     for role, text in (
         ("transmitter", config.transmitter.sabotage),
@@ -211,6 +202,13 @@ def check_sabotage(agreement: Agreement) -> None:
     ):
         if text and parse_sabotage(text).sample >= samples:
             raise ConfigError(f"{role}.sabotage = {text!r}: the flight has only {samples} samples")
+    if config.transmitter.rig == "serial":
+        from channel.links.serial.port import check_port
+
+        section = config.transmitter.serial
+        for port in filter(None, (section.port, section.motor_port)):
+            check_port(port, insecure=True)
+    return require_safe(config, accept_risk, agreement.parts)
 
 
 def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -> None:

@@ -108,7 +108,7 @@ def _agree_all(
     flight: options.FlightOptions, changes: list[dict[str, Any]], risk: MotorOptions
 ) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
-    from tenbaud.build.ends import check_parts, check_rig, check_sabotage
+    from tenbaud.build.ends import check_flight
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config, replay_notes
 
@@ -116,13 +116,10 @@ def _agree_all(
         flight_config(flight.preset, flight.config, change, allow_code=True) for change in changes
     ]
     agreements = [agree(one, flight.clock.value) for one in configs]
-    for agreement in agreements:
-        check_parts(agreement.config)
-        motors = check_rig(agreement.config, risk.accept_risk)
-        check_sabotage(agreement)
+    motors = [check_flight(agreement, risk.accept_risk) for agreement in agreements]
     for note in replay_notes(configs[0]):
         typer.echo(f"  {note}", err=True)
-    if motors:
+    if any(motors):
         confirm_motors(configs[0], risk.yes)
     return agreements
 

@@ -114,10 +114,11 @@ def _run(
     figure: bool = False,
     risk: MotorOptions | None = None,
 ) -> None:
+    """Run one end; `risk` is that of the transmitter, which has the rig and the flight's length."""
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from tenbaud.build.ends import check_parts, check_rig, check_sabotage
+    from tenbaud.build.ends import check_flight, check_parts
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
@@ -134,10 +135,9 @@ def _run(
     telemetry = TelemetryOptions(node.telemetry, node.allow_control, pace)
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
-    check_parts(config)
-    if role == "transmitter":  # it alone knows how long the flight is
-        check_sabotage(agreement)
-    if risk is not None and check_rig(config, risk.accept_risk):
+    if risk is None:
+        check_parts(config)
+    elif check_flight(agreement, risk.accept_risk):
         confirm_motors(config, risk.yes)
     telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None

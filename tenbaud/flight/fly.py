@@ -19,7 +19,7 @@ from channel.protocol.terms import Clock, Rung
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.controllers import controller_context
-from tenbaud.build.ends import check_parts, check_rig, check_sabotage
+from tenbaud.build.ends import check_flight
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
@@ -28,6 +28,7 @@ from tenbaud.build.recorded import flight_config
 from tenbaud.build.rig import plant_context
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.deprecated import with_current_names
+from tenbaud.config.kinds import REGISTRIES
 from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
 from tenbaud.config.outside_code import object_kind
 from tenbaud.config.schema import FlightConfig
@@ -39,20 +40,12 @@ from tenbaud.flight.demo import fly_demo
 from tenbaud.flight.display import StatusDisplay
 from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.report import removed_unless_begun
-from tenbaud.flight.status import Status
 from tenbaud.flight.viewing import ViewOptions
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder, create_run_folder
 from tenbaud.recording.notebook import in_notebook
 from tenbaud.recording.run import Run
 
-FIELDS = {
-    "model": "model.kind",
-    "coder": "coder.kind",
-    "plant": "transmitter.plant.kind",
-    "controller": "receiver.controller",
-}
-"""The setting that names each part."""
 REFERENCE_NAME = "reference.csv"
 
 
@@ -134,16 +127,12 @@ def fly(
         agreement = _agreement(loaded, clock, parts, accept_risk)
         looks = _looks(agreement, show, pace)
     with StatusDisplay() if show and sys.stderr.isatty() else nullcontext() as display:
-        on_status = display.show if display is not None else _unseen
-        result = fly_demo(agreement, folder, on_status, draw=draw, status="none", **looks)
+        show_status = display.show if display is not None else lambda _status: None
+        result = fly_demo(agreement, folder, show_status, draw=draw, status="none", **looks)
     if result.code:
         texts = dict.fromkeys([str(result.summary["outcome"]), *result.messages])
         raise FlightFailed("\n  ".join(texts), folder.path)
     return Run(folder.path)
-
-
-def _unseen(status: Status) -> None:
-    """Show nothing."""
 
 
 def _looks(agreement: Agreement, show: bool, pace: float | None) -> dict[str, Any]:
@@ -177,7 +166,7 @@ def _names(parts: Mapping[str, Any], link: str) -> dict[str, str]:
             'others; use link="memory", or name a class as "module:Class"'
         )
     return {
-        FIELDS[name]: part if isinstance(part, str) else object_kind(part)
+        REGISTRIES[name].field: part if isinstance(part, str) else object_kind(part)
         for name, part in parts.items()
     }
 
@@ -270,7 +259,5 @@ def _agreement(
             made, controller=build_class("the controller", controller, asked, {}, Controller)
         )
     agreement = replace(agreement, parts=made)
-    check_parts(loaded, made)
-    check_sabotage(agreement)
-    check_rig(loaded, accept_risk, made)
+    check_flight(agreement, accept_risk)
     return agreement

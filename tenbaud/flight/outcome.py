@@ -4,27 +4,13 @@ from __future__ import annotations
 
 import signal
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
 from channel.protocol.endings import End, Ending
+from tenbaud.exit_codes import ExitCode as ExitCode
 from tenbaud.files.whole import WriteError
 from tenbaud.sentences import endings
-
-
-class ExitCode(IntEnum):
-    """Exit codes of every command."""
-
-    OK = 0
-    FAILED = 1
-    USAGE = 2
-    MISMATCH = 3
-    LINK_LOST = 4
-    DESYNC = 5
-    SAFETY_STOP = 6
-    NOT_FLOWN = 7
-    NOT_WRITTEN = 8
-    INTERRUPTED = 130
 
 
 class NotFlown(StrEnum):

@@ -15,12 +15,14 @@ from tenbaud.files.whole import WriteError, remove, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
-from tenbaud.sentences.flown import Summary
+from tenbaud.sentences.flown import Summary, figures_of, verdict_of, warnings_of
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from tenbaud.recording.envelope import Curve
+
+LABEL_WIDTH = 16
 
 
 def write_up(
@@ -104,7 +106,6 @@ def show_summaries(
     """Print how flights ended; with `verbose` also every figure, the flights side by side."""
     from rich.console import Console
 
-    from tenbaud.flight.closing import closing_lines
     from tenbaud.flight.narrow import for_terminal
     from tenbaud.flight.screen import unicode_fits
 
@@ -115,6 +116,27 @@ def show_summaries(
         lines = closing_lines(summary, folder, unicode=unicode_fits(console))
         text = for_terminal("\n".join(lines))
         console.print(text, soft_wrap=True, highlight=False, markup=False)
+
+
+def closing_lines(summary: Summary, folder: RunFolder, *, unicode: bool = True) -> list[str]:
+    """Return the lines that end a flight on a terminal; angles are in degrees."""
+    lines = [verdict_of(summary, unicode)]
+    lines += [f"  {'! ' if not unicode else '⚠ '}{text}" for text in warnings_of(summary)]
+    shown = [*figures_of(summary, unicode), _what_next(summary, folder)]
+    return lines + [f"  {label:{LABEL_WIDTH}}{text}" for label, text in shown]
+
+
+def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:
+    """Return the file to open and the next command, as a label and its text."""
+    path = str(folder.path)
+    path = f'"{path}"' if " " in path else path
+    drawn = folder.figure.is_file()
+    label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)
+    if int(summary["exit_code"]):
+        return label, f"{place}   Next: tenbaud inspect {path}"
+    if summary["clock"] == "real":
+        return label, f"{place}   Next: tenbaud replay {path}"
+    return label, f"{place}   Next: tenbaud demo --view"
 
 
 def _table(summaries: Sequence[Summary]) -> Table:

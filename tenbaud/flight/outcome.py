@@ -8,9 +8,9 @@ from enum import StrEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
 from channel.protocol.endings import End, Ending
-from tenbaud.exit_codes import ExitCode as ExitCode
 from tenbaud.files.whole import WriteError
 from tenbaud.sentences import endings
+from tenbaud.sentences.exit_codes import ExitCode as ExitCode
 
 
 class NotFlown(StrEnum):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from tenbaud.exit_codes import ExitCode
+from tenbaud.sentences.exit_codes import ExitCode
 from tenbaud.sentences.quantities import in_degrees
 
 Summary = dict[str, Any]

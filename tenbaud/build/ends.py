@@ -15,7 +15,7 @@ from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
-from channel.line.line import CleanLine, Downlink, Line, Uplink
+from channel.line.line import CleanLine, Downlink, Line
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import SymbolWire, Wire
@@ -111,12 +111,6 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
             steps = output_steps(config, agreement.signals)
             return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
-
-
-def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
-    """Return the transmitter's way out onto a line."""
-    line = build_line(agreement, "up", wire)
-    return Uplink(agreement.terms, agreement.codec.coder.alphabet, line, wire, recorder)
 
 
 def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> Line:

@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from channel.codec.codec import Vector
 from channel.codec.signals import Signal, Signals
 from tenbaud.build.flight import REAL_RIGS
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import reference_sections
-from tenbaud.build.rig import build_device, real_rig_name
+from tenbaud.build.rig import build_axes, build_device, real_rig_name, wired_outputs
 from tenbaud.build.signals import build_limits, configured_signals, per_output, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
-from tenbaud.config.load import ConfigError, toml_text
+from tenbaud.config.load import ConfigError, flattened, toml_text
 from tenbaud.config.schema import FlightConfig
 from tenbaud.log.units import turn_in
 
@@ -37,6 +37,10 @@ DECLARATION_S = 0.5
 """Every sample of this time must say that the device is emulated."""
 LINE_DECLARATION_S = 2.0
 """A device that says it in a line between samples has this long."""
+TURNED_SHARE = 0.9
+"""of the nearer end of the range that an axis was turned through"""
+LEAST_COUNTS = 50
+"""An axis that was turned by less on one side was not turned to its end."""
 
 
 def drives_motors(config: FlightConfig) -> bool:
@@ -203,3 +207,46 @@ def rounded_down(value: float) -> float:
 def _shortest(values: Sequence[float]) -> float | list[float]:
     """Return one number where all are alike."""
     return values[0] if len(set(values)) == 1 else list(values)
+
+
+class TurnedAxis(Protocol):
+    """What was seen of an axis."""
+
+    name: str
+    angle_min_rad: float
+    angle_max_rad: float
+
+
+def proposed(config: FlightConfig, seen: Sequence[TurnedAxis]) -> tuple[dict[str, Any], list[str]]:
+    """Return the settings of a first flight by their full names, and what they do not rest on."""
+    signals = configured_signals(config)
+    by_name = {one.name: one for one in seen}
+    axes = {one.name: one for one in build_axes(config, signals)}
+    soft, not_seen = [], []
+    for name, unit in wired_outputs(signals).items():
+        axis, step = by_name[name], axes[name].turn / axes[name].counts_per_turn
+        reach = min(-axis.angle_min_rad, axis.angle_max_rad)
+        if reach < LEAST_COUNTS * step:
+            soft.append(math.inf)
+            not_seen.append(
+                f"{name} was turned from {axis.angle_min_rad:.3g} to {axis.angle_max_rad:.3g} {unit}, "
+                "not to an end on both sides of 0: its soft limit is a guess"
+            )
+        else:
+            soft.append(rounded_down(TURNED_SHARE * reach))
+    settings = first_settings(config, signals, soft)
+    names = ", ".join(one.name for one in signals.inputs)
+    not_seen += [
+        f"the motors ({names}): they stay disabled, so limits.command_max = "
+        f"{settings['limits.command_max']} is not measured, and neither signs nor outputs are checked",
+        "the emergency stop and the device's watchdog: press the one, unplug the other",
+    ]
+    section = config.transmitter
+    of_rig = {"transmitter": {"rig": section.rig, "bridge": _changed(section.bridge)}}
+    of_rig["transmitter"][section.rig] = _changed(getattr(section, section.rig))
+    return {"preset": config.preset} | dict(flattened(of_rig)) | settings, not_seen
+
+
+def _changed(section: Any) -> dict[str, Any]:
+    changed: dict[str, Any] = section.model_dump(mode="json", exclude_defaults=True)
+    return changed

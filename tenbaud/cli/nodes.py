@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,21 +19,28 @@ if TYPE_CHECKING:
     from tenbaud.recording.folder import RunFolder
 
 
+@dataclass(frozen=True, slots=True)
+class SensorOptions:
+    """What only the transmitter is told."""
+
+    duration: options.Duration = None
+    seed: options.Seed = None
+    rig: options.Rig = None
+    dry_run: options.DryRun = False
+    mismatch: options.Mismatch = None
+    disturbance: options.Disturbance = None
+    on_desync: options.OnDesync = None
+    pace: options.Pace = None
+    figure: options.Draw = True
+
+
 @spread
 def transmit(
     node: options.NodeOptions,
     addresses: options.Addresses,
     log: LogOptions,
     risk: MotorOptions,
-    duration: options.Duration = None,
-    seed: options.Seed = None,
-    rig: options.Rig = None,
-    dry_run: options.DryRun = False,
-    mismatch: options.Mismatch = None,
-    disturbance: options.Disturbance = None,
-    on_desync: options.OnDesync = None,
-    pace: options.Pace = None,
-    figure: options.Draw = True,
+    sensor: SensorOptions,
 ) -> None:
     """Run the sensor node: the rig, and one bit per sample to the receiver.
 
@@ -44,19 +52,10 @@ def transmit(
 
     [dim]tenbaud transmit --link serial --port /dev/ttyUSB0[/dim]
     """
-    changed = node.changes(
-        duration=duration,
-        seed=seed,
-        rig=rig,
-        log=log,
-        dry_run=dry_run,
-        mismatch=mismatch,
-        disturbance=disturbance,
-        on_desync=on_desync,
-    )
-    if pace is not None and node.clock is not options.ClockOption.VIRTUAL:
+    changed = options.overrides(**options.fields_of(node, sensor), log=log)
+    if sensor.pace is not None and node.clock is not options.ClockOption.VIRTUAL:
         raise typer.BadParameter("--pace slows the virtual clock down; the real one cannot be paced")
-    _run("transmitter", node, addresses, changed, pace=pace, figure=figure, risk=risk)
+    _run("transmitter", node, addresses, changed, pace=sensor.pace, figure=sensor.figure, risk=risk)
 
 
 @spread
@@ -83,7 +82,8 @@ def receive(
 
     [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
-    changed = node.changes(rig=rig, log=log, sabotaged_end="receiver")
+    own = options.fields_of(node)
+    changed = options.overrides(**own, rig=rig, log=log, sabotaged_end="receiver")
     if rigs.sessions is None:
         if rigs.configs is not None or rigs.flights is not None:
             raise typer.BadParameter("--configs and --flights go with --sessions, the names to serve")

@@ -231,10 +231,6 @@ class NodeOptions(_Configured):
     status: Annotated[str, typer.Option(hidden=True)] = "auto"
     """auto, lines or none."""
 
-    def changes(self, **own: Any) -> dict[str, Any]:
-        """Return the configuration that these options, and the command's own, set."""
-        return overrides(**fields_of(self), **own)
-
 
 FIELDS = {
     "duration": "duration_s",
@@ -255,10 +251,11 @@ FIELDS = {
 """Options that set one field of the configuration."""
 
 
-def fields_of(group: NodeOptions | FlightOptions | PlantOptions) -> dict[str, Any]:
-    """Return those of a group of options that `overrides` takes."""
+def fields_of(*groups: Any) -> dict[str, Any]:
+    """Return those of groups of options that `overrides` takes."""
     taken = (*FIELDS, "rig", "sabotage", "settings")
-    return {one.name: getattr(group, one.name) for one in fields(group) if one.name in taken}
+    pairs = [(group, one.name) for group in groups for one in fields(group)]
+    return {name: getattr(group, name) for group, name in pairs if name in taken}
 
 
 def overrides(

@@ -36,7 +36,7 @@ from tenbaud.flight.summary import (
     transmitter_part,
 )
 from tenbaud.flight.trouble import Trouble
-from tenbaud.flight.viewing import ALONE, ENDS, Viewing
+from tenbaud.flight.viewing import ENDS, Views, viewed
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.overview import OverviewRecorder
@@ -162,7 +162,7 @@ def run_in_memory(
     agreement: Agreement,
     folder: RunFolder,
     status: StatusMode,
-    viewing: Viewing = ALONE,
+    views: Views | None = None,
     drawing: NotebookDrawing | None = None,
 ) -> tuple[Outcome, Summary, Summary]:
     """Fly both ends in this process, on the virtual clock, without a link."""
@@ -173,7 +173,8 @@ def run_in_memory(
         rows: tuple[Recorder, Recorder] = recorder, receiver_recorder
         if drawing is not None:
             rows = drawing.recorders(*rows)
-        looked_at = [Endpoints(telemetry=viewing.options(role)) for role in ENDS]
+        views = views or viewed()
+        looked_at = [Endpoints(telemetry=views[role]) for role in ENDS]
         up = _telemetry(agreement, "transmitter", rows[0], looked_at[0])
         down = _telemetry(agreement, "receiver", rows[1], looked_at[1])
         run = transmit.prepare(agreement, up.recorder, DATAGRAM)
@@ -188,7 +189,7 @@ def run_in_memory(
             if drawing is not None:
                 drawing.at_tick(tick)
 
-        if viewing.endpoints or drawing is not None:
+        if views["receiver"].control or drawing is not None:
             run.node.before_every_tick(act)
         with (
             up.publishing(lambda tap: TransmitterComposer(run, tap, live)),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from channel.errors import FrameError, LinkLost
@@ -52,7 +52,6 @@ class Flight:
     agreement: Agreement
     folder: RunFolder
     recorder: McapRecorder
-    summary: Summary = field(default_factory=dict)
 
 
 class ManyHost:
@@ -207,11 +206,12 @@ class ManyHost:
         return Served(name, endpoint, link.peer_timeout_s, allowed_per_s, data)
 
     def _finish(self, flight: Flight, served: Served, error: Exception | None) -> None:
+        summary: Summary = {}
         try:
             endpoint = served.endpoint
             outcome = _outcome(flight.agreement, served, error)
             flight.recorder.close()
-            flight.summary = {
+            summary = {
                 "session": flight.name,
                 "folder": str(flight.folder.path),
                 **receiver_part(flight.agreement, endpoint, outcome),
@@ -221,8 +221,8 @@ class ManyHost:
             if flight.recorder.error is not None:
                 self.counts["not_written"] += 1
                 self._log(f"{flight.name}: {flight.recorder.error}")
-            write_summary(flight.folder, flight.summary)
-            self._log(f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}")
+            write_summary(flight.folder, summary)
+            self._log(f"{flight.name}: ended after {summary['samples']} samples: {outcome.text}")
         except WriteError as problem:
             self.counts["not_written"] += 1
             self._log(f"{flight.name}: {problem}")
@@ -231,8 +231,8 @@ class ManyHost:
             self._hub.leave(flight.name)
             self._opening.discard(flight.name)
             # Last: who sees the flight ended may count on its place being free.
-            if flight.summary:
-                self.summaries.append(flight.summary)
+            if summary:
+                self.summaries.append(summary)
 
 
 def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> Outcome:

@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.clocks import SkewedClock, SkewedPeer
-from channel.line.line import CleanLine
+from channel.line.line import CleanLine, Uplink
 from channel.line.virtual import Peer
 from channel.links.base import Link
 from channel.protocol.endings import End, Ending
 from channel.protocol.recording import Recorder
 from channel.protocol.wire import Wire
-from tenbaud.build.ends import build_line, build_transmitter, build_uplink
+from tenbaud.build.ends import build_line, build_transmitter
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, farewell_of
@@ -35,10 +35,11 @@ UPRIGHT = ("pendulum", "rotary pendulum")
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
-    endpoint = TransmitterEndpoint(node, build_uplink(agreement, wire, recorder))
+    line, alphabet = build_line(agreement, "up", wire), agreement.codec.coder.alphabet
+    uplink = Uplink(agreement.terms, alphabet, line, wire, recorder)
     virtual = agreement.clock == "virtual"
     downlink = build_line(agreement, "down", wire) if virtual else CleanLine()
-    return TransmitterRun(agreement, endpoint, downlink)
+    return TransmitterRun(agreement, TransmitterEndpoint(node, uplink), downlink)
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:

@@ -33,6 +33,10 @@ class TransmitterRun:
     extra: dict[str, Any] = field(default_factory=dict)
     """figures of the clock that was flown on"""
 
+    def expect_desyncs(self, more: float) -> None:
+        """Add to the number of lockstep failures that were asked for."""
+        self.desyncs_asked += more
+
     @property
     def node(self) -> TransmitterNode:
         return self.endpoint.node

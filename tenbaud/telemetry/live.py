@@ -109,7 +109,7 @@ class LiveTransmitter:
         impair(self._run.uplink.line, faults.up)
         impair(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
-            self._run.desyncs_asked = math.inf
+            self._run.expect_desyncs(math.inf)
         return _by_hand(ByHand.IMPAIR, detail=text)
 
     def _corrupt(self, end: Role, field: str) -> Event | None:
@@ -117,7 +117,7 @@ class LiveTransmitter:
         # Both codecs are the same kind: what this one cannot do, the receiver's refuses too.
         event = corrupt(session, field, session.next_sample, end == "transmitter")
         if event.cause is ByHand.CORRUPT:
-            self._run.desyncs_asked += 1
+            self._run.expect_desyncs(1)
         return event if end == "transmitter" else None
 
     def _next_sample_tick(self, tick: int) -> int:

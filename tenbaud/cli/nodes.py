@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SensorOptions:
-    """What only the transmitter is told."""
+    """The options of the transmitter alone."""
 
     duration: options.Duration = None
     seed: options.Seed = None

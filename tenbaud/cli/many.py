@@ -17,7 +17,6 @@ from tenbaud.cli import options
 if TYPE_CHECKING:
     from channel.protocol.terms import Clock
     from tenbaud.build.flight import Agreement
-    from tenbaud.flight.many import ManyHost
     from tenbaud.sentences.flown import Summary
 
 
@@ -78,8 +77,15 @@ def serve(
         finally:
             lines[1:] = []
             host.close()
-    summary = _summary(host, service.lateness.percentile_ms, sessions)
-    summary["turned_away"] = dict(refused + hub.counts.refused)
+    summary: Summary = {
+        "sessions": sessions,
+        "flights": host.summaries,
+        "refused": host.counts["refused"],
+        "strays": host.counts["strays"],
+        "loop_late_ms_p50": service.lateness.percentile_ms(50.0),
+        "loop_late_ms_p99": service.lateness.percentile_ms(99.0),
+        "turned_away": dict(refused + hub.counts.refused),
+    }
     write_whole(root / "summary.json", json.dumps(summary, indent=2) + "\n")
     if node.json:
         options.print_json(summary)
@@ -121,17 +127,6 @@ def agreements(
         return known[own][1]
 
     return agreement_of
-
-
-def _summary(host: ManyHost, late_ms: Callable[[float], float | None], sessions: str) -> Summary:
-    return {
-        "sessions": sessions,
-        "flights": host.summaries,
-        "refused": host.counts["refused"],
-        "strays": host.counts["strays"],
-        "loop_late_ms_p50": late_ms(50.0),
-        "loop_late_ms_p99": late_ms(99.0),
-    }
 
 
 def _show(summaries: list[Summary], root: Path) -> None:

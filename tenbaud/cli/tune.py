@@ -166,25 +166,17 @@ def _make_room(out: Path) -> None:
 def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
     """Print the result, and write it."""
     from tenbaud.files.whole import write_whole
+    from tenbaud.studies.tuning import report
 
     if not as_json:
-        _tell(tuned)
+        constants = [f"{name:36} {value:.6g}" for name, value in tuned.values.items()]
+        typer.echo("\n".join([*constants, *report(tuned)]))
     # After the figures, so that a full disk does not lose them.
     write_whole(out, preset)
     if as_json:
         options.print_json({**tuned._asdict(), "preset_file": str(out)})
     else:
         typer.echo(f"{out}: fly it with --config {out}")
-
-
-def _tell(tuned: Tuned) -> None:
-    """Print constants and errors."""
-    from tenbaud.studies.tuning import report
-
-    for name, value in tuned.values.items():
-        typer.echo(f"{name:36} {value:.6g}")
-    for line in report(tuned):
-        typer.echo(line)
 
 
 def _sizes(text: str) -> tuple[float, ...]:

@@ -95,7 +95,9 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
-        telemetry = _telemetry(agreement, "transmitter", recorder, endpoints)
+        telemetry = TelemetryEnd(
+            agreement, "transmitter", recorder, endpoints.telemetry, endpoints.node()
+        )
         with (
             refusals(endpoints) as refused,
             open_link(agreement, "transmitter", endpoints, stop) as link,
@@ -125,7 +127,7 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
-        telemetry = _telemetry(agreement, "receiver", recorder, endpoints)
+        telemetry = TelemetryEnd(agreement, "receiver", recorder, endpoints.telemetry, endpoints.node())
         with refusals(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
             endpoint = build_receiver(
@@ -174,9 +176,10 @@ def run_in_memory(
         if drawing is not None:
             rows = drawing.recorders(*rows)
         views = views or viewed()
-        looked_at = [Endpoints(telemetry=views[role]) for role in ENDS]
-        up = _telemetry(agreement, "transmitter", rows[0], looked_at[0])
-        down = _telemetry(agreement, "receiver", rows[1], looked_at[1])
+        up, down = (
+            TelemetryEnd(agreement, role, own, views[role], {})
+            for role, own in zip(ENDS, rows, strict=True)
+        )
         run = transmit.prepare(agreement, up.recorder, DATAGRAM)
         endpoint = build_receiver(agreement, down.recorder, DATAGRAM, references=down.steering)
         obeyed = down.fly_receiver(endpoint, stop)
@@ -311,20 +314,6 @@ def _end(
         gc.collect()
         gc.freeze()
         yield recorder, stop
-
-
-def _telemetry(
-    agreement: Agreement, role: Role, recorder: Recorder, endpoints: Endpoints
-) -> TelemetryEnd:
-    return TelemetryEnd(
-        agreement,
-        role,
-        recorder,
-        endpoints.telemetry,
-        endpoints.listen + endpoints.connect + endpoints.router,
-        endpoints.insecure,
-        endpoints.security,
-    )
 
 
 def _peer(run: TransmitterRun, link: Link, stop: Stop, recorder: McapRecorder) -> LinkPeer | None:

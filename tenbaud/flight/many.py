@@ -126,8 +126,13 @@ class ManyHost:
 
     def ended(self, served: Served, error: Exception | None) -> None:
         """End a flight: tell its transmitter now, and have its files finished."""
+        ending = Ending.STOPPED if error is None else Ending.FAILED
+        if isinstance(error, LinkLost):
+            ending = Ending.LINK_LOST
         try:
-            self._say_goodbye(served, error)
+            for message in served.endpoint.bye(End(ending)):
+                self._hub.send(served.name, message)
+            served.endpoint.session.flush_records()
         except Exception as problem:  # what has ended it may stand in the way of a farewell too
             error = error or problem
         self.counts["messages_dropped"] += served.dropped
@@ -136,14 +141,6 @@ class ManyHost:
         # Until its files are finished the name stays taken, and a new flight waits.
         self._opening.add(served.name)
         self._worker.submit(self._finish, flight, served, error)
-
-    def _say_goodbye(self, served: Served, error: Exception | None) -> None:
-        ending = Ending.STOPPED if error is None else Ending.FAILED
-        if isinstance(error, LinkLost):
-            ending = Ending.LINK_LOST
-        for message in served.endpoint.bye(End(ending)):
-            self._hub.send(served.name, message)
-        served.endpoint.session.flush_records()
 
     def close(self) -> None:
         """Wait until all files are finished; for after the loop."""

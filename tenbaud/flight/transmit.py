@@ -72,17 +72,20 @@ def _fly(
     should_stop: Stop,
     peer_present: Callable[[], bool] = lambda: True,
 ) -> Outcome:
-    inlet, rig = run.endpoint.inlet, run.node.rig
+    inlet, rig, session = run.endpoint.inlet, run.node.rig, run.node.session
     with rig:
         flight.greet()
         if should_stop():
             # A session may have begun meanwhile, whose receiver would wait for the flight.
             flight.leave(End(Ending.STOPPED))
             return Outcome(ExitCode.INTERRUPTED, endings.ending_text(Ending.STOPPED))
-        _check_welcome(run)
+        if session.refusal is not None:
+            raise ConfigMismatch(f"the receiver refused: {endings.refusal_text(session.refusal)}")
+        if session.phase is Phase.GREETING:
+            raise LinkLost("no answer to any request for a session came through this line")
         greeting_bytes = _control_bytes(run)
         started = time.perf_counter()
-        first = run.node.session.epoch_tick
+        first = session.epoch_tick
         try:
             run.ticks = flight.run(run.agreement.flight_ticks) - first
             run.rejoin_bytes = _control_bytes(run) - greeting_bytes
@@ -107,14 +110,6 @@ def _fly(
             if figures := rig.figures():
                 run.extra["rig"] = figures
     return outcome
-
-
-def _check_welcome(run: TransmitterRun) -> None:
-    session = run.node.session
-    if session.refusal is not None:
-        raise ConfigMismatch(f"the receiver refused: {endings.refusal_text(session.refusal)}")
-    if session.phase is Phase.GREETING:
-        raise LinkLost("no answer to any request for a session came through this line")
 
 
 def _control_bytes(run: TransmitterRun) -> int:

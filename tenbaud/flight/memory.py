@@ -181,12 +181,10 @@ class MemoryFlight:
             raise LinkLost("no request for a session came through the line")
         flown = self.loop.run(ticks)
         ended_by, end = "", End(Ending.OVER)
-        if flown < ticks:
-            ended = self.transmitter.end
-            ended_by = (
-                guard_text(self.node.guard.reason) if ended is None else end_text(ended, "receiver")
-            )
-            end = ended or End(Ending.SAFETY_STOP)
+        if flown != ticks:
+            cause = self.transmitter.end
+            ended_by = end_text(cause, "receiver") if cause else guard_text(self.node.guard.reason)
+            end = cause or End(Ending.SAFETY_STOP)
         self.loop.finish(lambda: end)
         self.receiver.flush_records()
         rows = (self.transmitter_rows, self.receiver_rows)

@@ -91,17 +91,11 @@ def _view_options(agreements: list[Agreement], shown: DemoOptions) -> ViewOption
         if shown.open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")
         return None
-    from channel.links.endpoints import loopback_host
     from tenbaud.flight.viewing import ViewOptions
-    from tenbaud.view.server import Address, free_port, require_nicegui
 
     if len(agreements) > 1 or agreements[0].link.in_process:
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
-    require_nicegui()
-    host = loopback_host()
-    address = Address(host, shown.view_port or free_port(host))
-    address.check()
-    return ViewOptions(address.port, shown.open_browser)
+    return ViewOptions.checked(shown.view_port, shown.open_browser)
 
 
 def _agree_all(

@@ -15,6 +15,7 @@ from typing import IO
 
 from channel.errors import LinkLost
 from channel.links.base import Role
+from channel.links.endpoints import loopback_host
 from tenbaud.flight.lifeline import end_child, start_child
 from tenbaud.telemetry.end import TelemetryOptions
 from tenbaud.telemetry.place import SOCKET
@@ -33,6 +34,17 @@ class ViewOptions:
 
     port: int
     open_browser: bool = False
+
+    @classmethod
+    def checked(cls, port: int, open_browser: bool) -> ViewOptions:
+        """Return the options of a page that can be served, on any free port for 0."""
+        from tenbaud.view.server import Address, free_port, require_nicegui
+
+        require_nicegui()
+        host = loopback_host()
+        address = Address(host, port or free_port(host))
+        address.check()
+        return cls(address.port, open_browser)
 
 
 Views = Mapping[Role, TelemetryOptions]

@@ -109,7 +109,7 @@ def _agree_all(
     configs = [
         flight_config(flight.preset, flight.config, change, allow_code=True) for change in changes
     ]
-    agreements = [agree(one, flight.clock.value) for one in configs]
+    agreements = [agree(one, flight.clock) for one in configs]
     motors = [check_flight(agreement, risk.accept_risk) for agreement in agreements]
     for note in replay_notes(configs[0]):
         typer.echo(f"  {note}", err=True)

@@ -42,7 +42,7 @@ def serve(
     from tenbaud.recording.folder import create_run_folder
 
     sessions, most = many.sessions or "", math.inf if many.flights is None else many.flights
-    agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
+    agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock)
     common = agreement_of("")
     if not common.link.serves_many:
         raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")

@@ -53,7 +53,7 @@ def transmit(
     [dim]tenbaud transmit --link serial --port /dev/ttyUSB0[/dim]
     """
     changed = options.overrides(**options.fields_of(node, sensor), log=log)
-    if sensor.pace is not None and node.clock is not options.ClockOption.VIRTUAL:
+    if sensor.pace is not None and node.clock != "virtual":
         raise typer.BadParameter("--pace slows the virtual clock down; the real one cannot be paced")
     _run("transmitter", node, addresses, changed, pace=sensor.pace, figure=sensor.figure, risk=risk)
 
@@ -133,7 +133,7 @@ def _run(
     config = flight_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
     telemetry = TelemetryOptions(node.telemetry, node.allow_control, pace)
-    agreement = replace(agree(config, node.clock.value), live=telemetry.control)
+    agreement = replace(agree(config, node.clock), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
     if risk is None:
         check_parts(config)

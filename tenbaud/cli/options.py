@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -14,13 +13,6 @@ from tenbaud.cli.log_options import LogOptions as LogOptions
 
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
-
-
-class ClockOption(StrEnum):
-    """The clock of a flight."""
-
-    REAL = "real"
-    VIRTUAL = "virtual"
 
 
 Preset = Annotated[
@@ -48,7 +40,9 @@ Seed = Annotated[
     int | None,
     typer.Option(help="Seed of all random numbers.", min=0, max=2**63 - 1),
 ]
-Clock = Annotated[ClockOption, typer.Option(help="virtual: as fast as possible; real: in real time.")]
+Clock = Annotated[
+    Literal["real", "virtual"], typer.Option(help="virtual: as fast as possible; real: in real time.")
+]
 Out = Annotated[
     Path | None, typer.Option(help="New folder for the run; runs/<time>_<name> if not given.")
 ]
@@ -195,7 +189,7 @@ class _Configured:
 class FlightOptions(_Configured):
     """The flight of `demo`."""
 
-    clock: Clock = ClockOption.VIRTUAL
+    clock: Clock = "virtual"
     duration: Duration = None
     seed: Seed = None
     link: str | None = None
@@ -217,7 +211,7 @@ class NodeOptions(_Configured):
     """zenoh, serial with --port, or a kind from an installed package."""
     port: str | None = None
     """Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT."""
-    clock: Clock = ClockOption.REAL
+    clock: Clock = "real"
     telemetry: str = ""
     """For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket that only this
     user can open; off beside an insecure link that leaves this machine."""

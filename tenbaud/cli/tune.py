@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -18,13 +17,6 @@ from tenbaud.studies.progress import progress_bar
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
     from tenbaud.studies.tuning import Tuned
-
-
-class MethodOption(StrEnum):
-    """Search method."""
-
-    EVOLUTION = "cma-es"
-    SIMPLEX = "nelder-mead"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +35,7 @@ class FitOptions:
     """Simulated flights for validation, with the next seeds."""
     train_share: Annotated[float, typer.Option(min=0.05, max=0.95)] = 0.5
     """Share of a recorded flight for the fit; the rest is for validation."""
-    method: MethodOption = MethodOption.EVOLUTION
+    method: Literal["cma-es", "nelder-mead"] = "cma-es"
     """Search method."""
     evaluations: Annotated[int, typer.Option(min=1, max=10_000_000)] = 600
     """Maximum number of parameter sets, including the configured one; each is flown on all flights for
@@ -109,7 +101,7 @@ def tune(
         overrides,
         {},
         split_of(fitting.seeds, fitting.test_seeds, fitting.train_share),
-        fitting.method.value,
+        fitting.method,
         fitting.evaluations,
         fitting.seed,
         allow_code,

@@ -51,7 +51,7 @@ def drives_motors(config: FlightConfig) -> bool:
     return section.rig != "hil" or section.hil.card_type != HIL_SUBSTITUTE
 
 
-def require_safe(config: FlightConfig, accept_risk: bool, parts: Parts) -> bool:
+def require_safe(config: FlightConfig, accept_risk: bool = False, parts: Parts | None = None) -> bool:
     """Return whether motors of a real rig will turn; ConfigError where what that needs is missing.
 
     `accept_risk`: a person has typed that it may be missing. A device that declares itself emulated
@@ -59,6 +59,7 @@ def require_safe(config: FlightConfig, accept_risk: bool, parts: Parts) -> bool:
     """
     if not drives_motors(config):
         return False
+    parts = parts or Parts()
     signals = configured_signals(config, parts)
     missing = list(_missing(config, signals, parts))
     if not missing or accept_risk:

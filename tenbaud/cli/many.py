@@ -6,7 +6,7 @@ import gc
 import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from tenbaud.cli import options
 
 if TYPE_CHECKING:
     from channel.protocol.terms import Clock
+    from receiver.loops.many import ManyService
     from tenbaud.build.flight import Agreement
     from tenbaud.sentences.flown import Summary
 
@@ -77,15 +78,7 @@ def serve(
         finally:
             lines[1:] = []
             host.close()
-    summary: Summary = {
-        "sessions": sessions,
-        "flights": host.summaries,
-        "refused": host.counts["refused"],
-        "strays": host.counts["strays"],
-        "loop_late_ms_p50": service.lateness.percentile_ms(50.0),
-        "loop_late_ms_p99": service.lateness.percentile_ms(99.0),
-        "turned_away": dict(refused + hub.counts.refused),
-    }
+    summary = _summary(host, service, sessions, refused + hub.counts.refused)
     write_whole(root / "summary.json", json.dumps(summary, indent=2) + "\n")
     if node.json:
         options.print_json(summary)
@@ -127,6 +120,20 @@ def agreements(
         return known[own][1]
 
     return agreement_of
+
+
+def _summary(
+    host: ManyHost, service: ManyService, sessions: str, turned_away: Mapping[str, int]
+) -> Summary:
+    return {
+        "sessions": sessions,
+        "flights": host.summaries,
+        "refused": host.counts["refused"],
+        "strays": host.counts["strays"],
+        "loop_late_ms_p50": service.lateness.percentile_ms(50.0),
+        "loop_late_ms_p99": service.lateness.percentile_ms(99.0),
+        "turned_away": dict(turned_away),
+    }
 
 
 def _show(summaries: list[Summary], root: Path) -> None:

@@ -112,7 +112,7 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
     with config_errors():
         codec = build_codec(config, parts)
         terms = checked_terms(config, codec, clock, parts.controller)
-        two_way, described = build_two_way(config, codec, terms, parts.controller)
+        two_way, described = build_two_way(config, codec, terms, parts)
     shared = config.shared_json(terms.lead_ticks, described)
     identity = Identity(software_version(), shared, numerics_probe(codec, two_way))
     return Agreement(config, clock, codec, terms, identity, parts=parts, two_way=two_way)

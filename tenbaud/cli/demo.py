@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 DEFAULT_PRESET = "tuned-10baud"
 DEFAULT_MISMATCH = 0.1
 """No model is exact."""
+OF_OUTPUT = ("out", "json", "verbose", "view", "view_port", "open_browser")
+"""Options that change nothing of what is flown."""
 VIEW_DURATION_S = 3600.0
 """A viewed flight lasts until it is stopped, or this long."""
 
@@ -47,7 +50,11 @@ class DemoOptions:
 
 @spread
 def demo(
-    flight: options.FlightOptions, log: LogOptions, risk: MotorOptions, shown: DemoOptions
+    context: typer.Context,
+    flight: options.FlightOptions,
+    log: LogOptions,
+    risk: MotorOptions,
+    shown: DemoOptions,
 ) -> None:
     """Fly both ends on this machine: two processes, one bit per sample between them.
 
@@ -74,7 +81,25 @@ def demo(
     agreements = _agree_all(flight, changes, risk)
     pace = _checked_pace(agreements[0], shown)
     view = _view_options(agreements, shown)
-    raise typer.Exit(_fly_all(agreements, shown, view, pace))
+    paged = len(agreements) == 1 and agreements[0].clock == "virtual" and view is None
+    then = _on_the_page(context) if paged and not agreements[0].link.in_process else None
+    raise typer.Exit(_fly_all(agreements, shown, view, pace, then))
+
+
+def _on_the_page(context: typer.Context) -> str:
+    """Return the command that flies what this one flew, with the live page."""
+    words = []
+    for option in context.command.params:
+        source, name = context.get_parameter_source(option.name or ""), option.name or ""
+        if name in OF_OUTPUT or source is None or source.name != "COMMANDLINE":
+            continue
+        value = context.params[name]
+        for one in value if getattr(option, "multiple", False) else [value]:
+            if getattr(option, "is_flag", False):
+                words.append((option.opts if one else option.secondary_opts)[0])
+            else:
+                words += [option.opts[0], str(one)]
+    return shlex.join(["tenbaud", "demo", *words, "--view"])
 
 
 def _checked_pace(agreement: Agreement, shown: DemoOptions) -> float | None:
@@ -119,7 +144,11 @@ def _agree_all(
 
 
 def _fly_all(
-    agreements: list[Agreement], shown: DemoOptions, view: ViewOptions | None, pace: float | None
+    agreements: list[Agreement],
+    shown: DemoOptions,
+    view: ViewOptions | None,
+    pace: float | None,
+    then: str | None,
 ) -> int:
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.display import StatusDisplay
@@ -157,5 +186,6 @@ def _fly_all(
         if result.code:
             break
     if results:
-        show_summaries([result.summary for result in results], folders, verbose=shown.verbose)
+        summaries = [result.summary for result in results]
+        show_summaries(summaries, folders, verbose=shown.verbose, then=then)
     return int(result.code)

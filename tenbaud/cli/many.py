@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from channel.protocol.terms import Clock
     from receiver.loops.many import ManyService
     from tenbaud.build.flight import Agreement
+    from tenbaud.flight.many import ManyHost
     from tenbaud.sentences.flown import Summary
 
 

@@ -17,6 +17,7 @@ from channel.errors import TenbaudError
 from channel.protocol.terms import Clock, Rung
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
+from tenbaud.build.codec import build_model
 from tenbaud.build.controllers import controller_context
 from tenbaud.build.ends import check_flight
 from tenbaud.build.flight import Agreement, agree
@@ -28,7 +29,15 @@ from tenbaud.build.rig import plant_context
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.kinds import REGISTRIES
-from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
+from tenbaud.config.load import (
+    OWN,
+    ConfigError,
+    config_errors,
+    load_config,
+    merged,
+    merged_values,
+    nested,
+)
 from tenbaud.config.outside_code import object_kind
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
@@ -241,19 +250,20 @@ def _agreement(
     loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any], accept_risk: bool
 ) -> Agreement:
     """Return what both ends share, with every part built and checked."""
-    agreement = agree(loaded, clock, _objects(parts))
     plant, controller = parts.get("plant"), parts.get("controller")
+    objects = _objects(parts)
+    if inspect.isclass(controller):
+        with config_errors():
+            asked = controller_context(loaded, build_model(loaded, objects))
+        built = build_class("the controller", controller, asked, {}, Controller)
+        objects = replace(objects, controller=built, has_own_set_points=False)
+    agreement = agree(loaded, clock, objects)
     made = agreement.parts
     context = plant_context(loaded, loaded.timing.tick_s, agreement.signals)
     if is_system(plant):
         made = replace(made, plant=system_plant(plant, context))
     elif inspect.isclass(plant):
         made = replace(made, plant=build_class("the plant", plant, context, {}, Plant))
-    if inspect.isclass(controller):
-        asked = controller_context(loaded, agreement.codec.model)
-        made = replace(
-            made, controller=build_class("the controller", controller, asked, {}, Controller)
-        )
     agreement = replace(agreement, parts=made)
     check_flight(agreement, accept_risk)
     return agreement

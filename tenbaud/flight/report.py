@@ -101,9 +101,16 @@ def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> No
 
 
 def show_summaries(
-    summaries: Sequence[Summary], folders: Sequence[RunFolder], *, verbose: bool = False
+    summaries: Sequence[Summary],
+    folders: Sequence[RunFolder],
+    *,
+    verbose: bool = False,
+    then: str | None = None,
 ) -> None:
-    """Print how flights ended; with `verbose` also every figure, the flights side by side."""
+    """Print how flights ended; with `verbose` also every figure, the flights side by side.
+
+    `then` is as for `closing_lines`.
+    """
     from rich.console import Console
 
     from tenbaud.flight.narrow import for_terminal
@@ -113,30 +120,33 @@ def show_summaries(
     if verbose:
         console.print(_table(summaries))
     for summary, folder in zip(summaries, folders, strict=True):
-        lines = closing_lines(summary, folder, unicode=unicode_fits(console))
+        lines = closing_lines(summary, folder, unicode=unicode_fits(console), then=then)
         text = for_terminal("\n".join(lines))
         console.print(text, soft_wrap=True, highlight=False, markup=False)
 
 
-def closing_lines(summary: Summary, folder: RunFolder, *, unicode: bool = True) -> list[str]:
-    """Return the lines that end a flight on a terminal; angles are in degrees."""
+def closing_lines(
+    summary: Summary, folder: RunFolder, *, unicode: bool = True, then: str | None = None
+) -> list[str]:
+    """Return the lines that end a flight on a terminal; angles are in degrees.
+
+    `then`: the next command after a flight that ended well; None: its replay.
+    """
     lines = [verdict_of(summary, unicode)]
     lines += [f"  {'! ' if not unicode else '⚠ '}{text}" for text in warnings_of(summary)]
-    shown = [*figures_of(summary, unicode), _what_next(summary, folder)]
+    shown = [*figures_of(summary, unicode), _what_next(summary, folder, then)]
     return lines + [f"  {label:{LABEL_WIDTH}}{text}" for label, text in shown]
 
 
-def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:
+def _what_next(summary: Summary, folder: RunFolder, then: str | None) -> tuple[str, str]:
     """Return the file to open and the next command, as a label and its text."""
     path = str(folder.path)
     path = f'"{path}"' if " " in path else path
     drawn = folder.figure.is_file()
     label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)
-    if int(summary["exit_code"]):
-        return label, f"{place}   Next: tenbaud inspect {path}"
-    if summary["clock"] == "real":
-        return label, f"{place}   Next: tenbaud replay {path}"
-    return label, f"{place}   Next: tenbaud demo --view"
+    failed = int(summary["exit_code"])
+    following = f"tenbaud inspect {path}" if failed else then or f"tenbaud replay {path}"
+    return label, f"{place}   Next: {following}"
 
 
 def _table(summaries: Sequence[Summary]) -> Table:

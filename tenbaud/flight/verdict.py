@@ -138,7 +138,7 @@ def _on_commands(flight: Agreement) -> str:
 def _on_rejoins(flight: Agreement) -> str:
     if flight.terms.is_mirrored:
         return DOWN_SYMBOLS
-    if flight.terms.downlink == "narrow":
+    if flight.terms.is_narrow:
         return f"{DOWN_SYMBOLS}; {_on_commands(flight)}"
     return (
         f"each command frame repeats channel.repeats = {flight.terms.repeats} samples: raise it at "

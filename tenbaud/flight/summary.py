@@ -121,23 +121,13 @@ def _rate(run: TransmitterRun) -> Summary:
     """Return the symbol rate asked for, the one kept, and the share that is missing."""
     terms, counts = run.agreement.terms, run.node.session.counts
     asked = 1e9 * terms.symbols_per_word / terms.sample_ns
-<<<<<<< HEAD
     share: float | None = None
     if run.ticks:
         samples = run.ticks / terms.ticks_per_sample
-        if terms.downlink == "narrow":
+        if terms.is_narrow:
             # Whether the last words were consumed was not certain yet.
             samples = max(1, counts["confirmed"])
         share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
-=======
-    if not run.ticks:
-        return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
-    samples = run.ticks / terms.ticks_per_sample
-    if terms.is_narrow:
-        # Whether the last words were consumed was not certain yet.
-        samples = max(1, counts["confirmed"])
-    share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
->>>>>>> merging
     return {
         "symbols_per_s_asked": asked,
         "symbols_per_s_kept": None if share is None else share * asked,

@@ -13,7 +13,7 @@ from scipy.signal import cont2discrete, dlsim
 from plant_sim.identification import simulation
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import estimate, moments_of
-from plant_sim.identification.excitation import PseudoRandom
+from plant_sim.identification.excitation import pseudo_random
 from plant_sim.identification.faults import require_units
 from plant_sim.identification.filters import Array, SignalFilter, low_pass
 from plant_sim.identification.pipeline import Identification, Options, identify
@@ -301,8 +301,8 @@ def test_when_a_record_is_long_then_blocks_give_the_estimates_of_single_samples(
 
 
 def test_when_filters_are_far_from_the_motion_then_both_frequencies_are_named() -> None:
-    signal = PseudoRandom(H, 0.05, 0.0, 3.0)
-    u = np.array([[signal.volts(tick)] for tick in range(3000)])
+    signal = pseudo_random(H, 0.05, 0.0, 3.0)
+    u = np.array([[signal(tick)] for tick in range(3000)])
     system = cont2discrete(([80.0], [1.0, 0.4, 80.0]), H)
     y = np.asarray(dlsim(system, u)[1])
     structure = parse_linear("siso:2,0", ("output",), ("input",))

@@ -10,7 +10,7 @@ import pytest
 
 from plant_sim.identification import simulation
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.excitation import REST_S, PseudoRandom, excite, parse_excitation
+from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.filters import Array
 from plant_sim.identification.pipeline import Options, identify
 from plant_sim.identification.pitch import PitchStructure, quiescent_angle
@@ -232,13 +232,12 @@ def test_when_an_excitation_is_not_understood_then_the_grammar_is_shown(text: st
 
 
 def test_when_a_sequence_is_pseudo_random_then_it_repeats_only_after_its_length() -> None:
-    for length in (7, 9, 11):
-        signal = PseudoRandom(STEP_S, STEP_S, 0.0, 1.0, length)
-        bits = signal.bits
-        assert len(bits) == 2**length - 1
-        assert sum(bits) == 2 ** (length - 1)
-        words = {bits[index : index + length] for index in range(len(bits) - length)}
-        assert len(words) == len(bits) - length
+    volts = parse_excitation(f"prbs:{STEP_S},0,1", STEP_S)
+    values = [volts(tick) for tick in range(2 * 511)]
+    assert values[:511] == values[511:]
+    assert values[:511].count(1.0) == 256
+    words = {tuple(values[index : index + 9]) for index in range(511)}
+    assert len(words) == 511
 
 
 def test_when_the_rig_ends_early_then_the_experiment_says_at_which_tick() -> None:

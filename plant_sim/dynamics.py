@@ -56,7 +56,8 @@ class FunctionPlant(SteppedPlant):
 
     def _step(self, held: tuple[float, ...], push: tuple[float, ...]) -> None:
         self._held = np.array(held)
-        u, pushed = self._held, np.zeros_like(self.state)
+        u = self._held
+        pushed: NDArray[np.float64] = np.zeros_like(self.state)
         if self._noise is None:
             u = u + push
         else:

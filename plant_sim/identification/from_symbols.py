@@ -18,9 +18,8 @@ from plant_sim.identification.estimator import Estimate
 from plant_sim.identification.filters import Array
 from plant_sim.identification.maximum import Maximum, climb
 from plant_sim.identification.pipeline import Identification, doubts, uncertain
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.regression import Filters, Regression
-from plant_sim.identification.structures import Structure, holding, names_of
+from plant_sim.identification.structures import PitchStructure, Structure, holding, names_of
 from plant_sim.identification.symbols import Likelihood, Symbols, likelihood
 
 GUESSED = -math.log(2.0)

@@ -18,13 +18,13 @@ from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import CONDITION_MIN
 from plant_sim.identification.faults import dominant_rad_s, require_motion
 from plant_sim.identification.filters import Array
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
 from plant_sim.identification.simulation import Segments, SimulationFit
 from plant_sim.identification.structures import (
     LinearStructure,
     Parameter,
+    PitchStructure,
     Structure,
     gains_of,
     holding,

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from plant_sim.identification.filters import Array, lagged
-from plant_sim.identification.pitch import PitchStructure
-from plant_sim.identification.structures import LinearStructure, Structure, names_of
+from plant_sim.identification.structures import LinearStructure, PitchStructure, Structure, names_of
 
 STEP_MAX = 0.3
 """of a Runge-Kutta step, over the time constant of the fastest motion"""

@@ -9,9 +9,9 @@ import numpy as np
 
 from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.pipeline import Options
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.structures import PitchStructure
 from plant_sim.pitch import PitchPlant
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import load_config

@@ -18,9 +18,8 @@ import numpy as np
 
 from plant_sim.identification import simulation
 from plant_sim.identification.pipeline import Options, identify
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.regression import regress
-from plant_sim.identification.structures import holding
+from plant_sim.identification.structures import PitchStructure, holding
 from reproduction.paper.flights import Job, Overrides
 from reproduction.paper.identified import MOTOR_LAG_S
 from tenbaud.config.load import load_config

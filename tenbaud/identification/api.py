@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.pipeline import Options
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters
+from plant_sim.identification.structures import PitchStructure
 from tenbaud.build.signals import build_limits, configured_signals
 from tenbaud.config.load import given_names, load_config, nested
 from tenbaud.config.schema import FlightConfig, FlightLogSection

@@ -10,8 +10,7 @@ import numpy as np
 from channel.codec.codec import Model, Vector
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.filters import Array
-from plant_sim.identification.pitch import COSINE, SINE, PitchStructure
-from plant_sim.identification.structures import Structure, names_of
+from plant_sim.identification.structures import COSINE, SINE, PitchStructure, Structure, names_of
 
 ORDER_MAX = 2
 NUDGE = 1e-4

@@ -7,9 +7,9 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.pitch import PitchStructure, quiescent_angle
+from plant_sim.identification.pitch import quiescent_angle
 from plant_sim.identification.record import Record
-from plant_sim.identification.structures import Structure, parse_linear
+from plant_sim.identification.structures import PitchStructure, Structure, parse_linear
 
 SPEEDS = ("speed", "omega", "velocity", "rpm", "rate", "drehzahl")
 """words of an output's name that say that it has no rate"""

@@ -13,9 +13,10 @@ from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.filters import Array
 from plant_sim.identification.pipeline import Options, identify
-from plant_sim.identification.pitch import PitchStructure, quiescent_angle
+from plant_sim.identification.pitch import quiescent_angle
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.structures import PitchStructure
 from tests.plant_sim.identification.experiments import (
     EXCITATION_A,
     EXCITATION_B,

@@ -7,6 +7,7 @@ plant step. Every disturbance is a pure function of the step index, so steps may
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Protocol, TypeAlias
 
@@ -40,7 +41,7 @@ class Disturbance(Protocol):
         ...
 
 
-class PlannedDisturbance:
+class PlannedDisturbance(ABC):
     """A disturbance whose torques can be had in advance, as studies ask for them.
 
     They are drawn in blocks of steps, of which only one is ever kept.
@@ -65,9 +66,9 @@ class PlannedDisturbance:
         blocks = range(-(-steps // BLOCK_STEPS))
         return np.concatenate([np.empty(0), *(self.draw(index) for index in blocks)])[:steps]
 
+    @abstractmethod
     def draw(self, block_index: int) -> Torques:
         """Return the torques of a block."""
-        raise NotImplementedError
 
 
 def pushes_of(disturbances: Sequence[Disturbance | None], steps: int) -> Pushes:

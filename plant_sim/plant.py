@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -87,7 +88,7 @@ def held_command(command: Sequence[float], largest: Sequence[float]) -> tuple[fl
     return tuple([min(max(one, -most), most) for one, most in zip(command, largest, strict=True)])
 
 
-class SteppedPlant:
+class SteppedPlant(ABC):
     """The common part of plants: commands within their limits, and the disturbances of a step."""
 
     def __init__(self, context: PlantContext, places: int) -> None:
@@ -110,6 +111,6 @@ class SteppedPlant:
         self._steps += 1
         self._step(held, push)
 
+    @abstractmethod
     def _step(self, held: tuple[float, ...], push: tuple[float, ...]) -> None:
         """Advance by a step of a held command and held disturbances."""
-        raise NotImplementedError

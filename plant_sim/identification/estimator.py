@@ -93,18 +93,12 @@ class Estimate:
     target: float
     """root mean square of xi"""
 
-    @property
-    def deviations(self) -> Array:
-        """Return the standard errors."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
-
 
 def estimate(
     moments: Moments,
     *,
     forgetting_per_s: float = 0.01,
     gain: float | None = 1e3,
-    gain_bound: float | None = None,
     memory_s: float = 6.0,
     shown: int | None = None,
     constant: int | None = None,
@@ -112,10 +106,10 @@ def estimate(
     """Run (9), (10) over all blocks.
 
     `forgetting_per_s` is alpha, `gain` the diagonal of Gamma(0) (None: large, by the size of each
-    regressor), `gain_bound` what the norm of Gamma may not exceed (ten times Gamma(0) if not given),
-    `memory_s` longer than the noise's memory. The first `shown` parameters count for the condition;
-    the others describe how the record begins. `constant` is the regressor that is always 1: what it
-    explains of the others does not tell them apart, and does not make them alike.
+    regressor); the norm of Gamma may not exceed ten times that of Gamma(0). `memory_s` is longer than
+    the noise's memory. The first `shown` parameters count for the condition; the others describe how
+    the record begins. `constant` is the regressor that is always 1: what it explains of the others does
+    not tell them apart, and does not make them alike.
     """
     if not 0.0 <= forgetting_per_s < math.inf:
         raise IdentificationError(f"forgetting_per_s is {forgetting_per_s}; it must be at least 0")
@@ -128,10 +122,7 @@ def estimate(
         if not (math.isfinite(gain) and gain > 0.0):
             raise IdentificationError(f"gain is {gain}; it must be finite and above 0")
         start = np.full(size, 1.0 / gain)
-    norm = float(np.sqrt(np.sum(start**-2.0)))
-    bound = 10.0 * norm if gain_bound is None else gain_bound
-    if bound < norm:
-        raise IdentificationError(f"gain_bound is {bound:g}, below Gamma(0) itself; raise it")
+    bound = 10.0 * float(np.sqrt(np.sum(start**-2.0)))
     information, product = np.diag(start), np.zeros(size)
     inverse = np.diag(1.0 / start)
     history = np.empty((len(moments.products), size))

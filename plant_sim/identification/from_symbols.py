@@ -99,18 +99,14 @@ def levels_of(chance: Likelihood, values: Mapping[str, float], states: Array) ->
     outputs = states[:, ::order]
     signals = structure.signals(outputs)
     acting = chance.drives.reshape(len(states), chance.steps, -1).mean(axis=1)
-    count = signals.shape[1]
+    columns = np.hstack((signals, acting, np.ones((len(states), 1))))
     terms, targets = {}, []
     for equation in structure.equations:
         total = np.zeros(len(states))
         for term in equation.terms:
-            if term.signal < count:
-                place = term.signal * order + term.derivative
-                column = states[:, place] if term.derivative else signals[:, term.signal]
-            elif term.signal < count + acting.shape[1]:
-                column = acting[:, term.signal - count]
-            else:
-                column = np.ones(len(states))
+            column = columns[:, term.signal]
+            if term.derivative:
+                column = states[:, term.signal * order + term.derivative]
             terms[term.name] = float(np.sqrt(np.mean(column**2)))
             total += term.sign * values.get(term.name, 0.0) * column
         targets.append(float(np.sqrt(np.mean(total**2))))

@@ -1,4 +1,4 @@
-"""The angle of a pitch axis at rest, theta_0 of (11): measured in a quiescent stretch, as in the paper."""
+"""The angle of a pitch axis at rest, theta_0 of (11): measured in a quiescent stretch."""
 
 from __future__ import annotations
 

@@ -22,8 +22,7 @@ from tenbaud.identification import written
 from tenbaud.identification.beside import TRUE, Beside, beside, true_values
 from tenbaud.identification.bits import Bits, run_bits
 from tenbaud.identification.closed_loop import with_commands
-from tenbaud.identification.coder import with_coder
-from tenbaud.identification.flown import Flown, fly_record
+from tenbaud.identification.flown import Flown, fly_record, with_coder
 from tenbaud.identification.run import Identified, Wanted, run
 from tenbaud.identification.sources import Source, from_arrays, from_bits, from_log, from_rig
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tenbaud.log.dialect import DATE, MIXED, Dialect, find_dialect
-from tenbaud.log.export import export_roles
-from tenbaud.log.table import Array, LogError, Table, Wanted
+from tenbaud.log.table import Array, LogError, Table, Wanted, export_roles
 from tenbaud.log.units import DATE_TIME
 
 if TYPE_CHECKING:

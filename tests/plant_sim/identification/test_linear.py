@@ -210,20 +210,6 @@ def test_when_a_structure_of_one_output_gets_two_then_both_are_named() -> None:
         parse_linear("siso:2,1", ("pitch", "yaw"), ("u",))
 
 
-@pytest.mark.parametrize(
-    ("polynomial", "text"),
-    [
-        ([1.0, -2.0, 2.0], "not Hurwitz"),
-        ([1.0, 0.0, 2.0], "not Hurwitz"),
-        ([2.0, 2.0, 2.0], "begin with 1"),
-        ([1.0, math.nan], "finite"),
-    ],
-)
-def test_when_a_filter_makes_no_sense_then_it_is_refused(polynomial: list[float], text: str) -> None:
-    with pytest.raises(IdentificationError, match=text):
-        SignalFilter(polynomial, H, 0.0)
-
-
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_when_a_signal_is_filtered_in_pieces_then_every_derivative_is_that_of_the_exact_filter(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Final, Protocol
+from typing import ClassVar, Final, TypeAlias
 
 
 def counts_of(
@@ -23,19 +23,6 @@ def angle_of(
 
 EXACT_PER_UNIT: Final = 2.0**40
 """Counts of an output that is read exactly; they only tell whether it moved."""
-
-
-class OutputReader(Protocol):
-    """The reader of one output of a plant."""
-
-    @property
-    def step(self) -> float:
-        """Return how far the values that it shows lie apart; 0: it shows them as they are."""
-        ...
-
-    def read(self, value: float, /) -> tuple[int, float]:
-        """Return the count of a finite value, and the value that is made of it."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +57,11 @@ class Encoder:
 
     @property
     def step(self) -> float:
+        """Return how far the values that it shows lie apart."""
         return self.turn / self.counts_per_turn
 
     def read(self, value: float) -> tuple[int, float]:
+        """Return the count of a value, and the value that is made of it."""
         count = self.counts(value)
         return count, self.angle_rad(count)
 
@@ -90,6 +79,8 @@ class ExactReader:
     def read(self, value: float) -> tuple[int, float]:
         return math.floor(value * EXACT_PER_UNIT), value
 
+
+OutputReader: TypeAlias = Encoder | ExactReader
 
 QUANSER_PITCH: Final = Encoder(counts_per_turn=4096)
 """Pitch and elevation of a Quanser 3-DOF helicopter: 1024 lines, read in quadrature."""

@@ -45,6 +45,19 @@ def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Mat
     return found[:states, :states], found[:states, states:]
 
 
+def van_loan(dynamics: Matrix, noise: Matrix, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
+    states = len(dynamics)
+    block = np.zeros((2 * states, 2 * states))
+    block[:states, :states] = -dynamics
+    block[:states, states:] = noise
+    block[states:, states:] = dynamics.T
+    exponential = scipy.linalg.expm(block * period_s)
+    transition = exponential[states:, states:].T
+    covariance = transition @ exponential[:states, states:]
+    return transition, 0.5 * (covariance + covariance.T)
+
+
 def differences(function: Callable[[Matrix], Matrix], at: Matrix, steps: Matrix) -> Matrix:
     """Return the derivatives of a vector by central differences, a column for each entry of `at`."""
     columns = []

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import (
@@ -77,13 +78,9 @@ class Regression:
     @property
     def covariance(self) -> Array:
         """Return the parameters' covariance; those of different equations are taken apart."""
-        counts = [len(equation.terms) for equation in self.structure.equations]
-        whole = np.zeros((sum(counts), sum(counts)))
-        first = 0
-        for count, one in zip(counts, self.estimates, strict=True):
-            whole[first : first + count, first : first + count] = one.covariance[:count, :count]
-            first += count
-        return whole
+        pairs = zip(self.structure.equations, self.estimates, strict=True)
+        counted = [(len(equation.terms), one.covariance) for equation, one in pairs]
+        return np.asarray(block_diag(*[whole[:count, :count] for count, whole in counted]))
 
     @property
     def condition(self) -> float:

@@ -16,9 +16,9 @@ import numpy as np
 
 from channel.codec.coders.direction import SQUARINGS, DirectionParameters
 from channel.codec.coders.learning import LearningParameters
-from plant_sim.zero_order_hold import discretised
+from plant_sim.zero_order_hold import discretised, van_loan
 from tenbaud.bounds.floor import ideal_worth, period_cost, require_rate
-from tenbaud.bounds.linear import Matrix, rate_needed, sampled, van_loan
+from tenbaud.bounds.linear import Matrix, rate_needed, sampled
 from tenbaud.design.plant import LinearPlant, rows_of
 
 ROUNDS = 25

@@ -17,7 +17,8 @@ from channel.codec.coders.direction import DirectionCoder
 from channel.codec.coders.learning import LearningCoder
 from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
-from tenbaud.bounds.linear import Matrix, van_loan
+from plant_sim.zero_order_hold import van_loan
+from tenbaud.bounds.linear import Matrix
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import plant_of
 from tenbaud.design.plant import rows_of

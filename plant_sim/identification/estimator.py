@@ -20,6 +20,7 @@ Gamma (sum of blocks squared) Gamma.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,15 +102,15 @@ def estimate(
     gain: float | None = 1e3,
     memory_s: float = 6.0,
     shown: int | None = None,
-    constant: int | None = None,
+    constants: Sequence[int] = (),
 ) -> Estimate:
     """Run (9), (10) over all blocks.
 
     `forgetting_per_s` is alpha, `gain` the diagonal of Gamma(0) (None: large, by the size of each
     regressor); the norm of Gamma may not exceed ten times that of Gamma(0). `memory_s` is longer than
     the noise's memory. The first `shown` parameters count for the condition; the others describe how
-    the record begins. `constant` is the regressor that is always 1: what it explains of the others does
-    not tell them apart, and does not make them alike.
+    the record begins. `constants` are the regressors that are always 1: what they explain of the
+    others does not tell them apart, and does not make them alike.
     """
     if not 0.0 <= forgetting_per_s < math.inf:
         raise IdentificationError(f"forgetting_per_s is {forgetting_per_s}; it must be at least 0")
@@ -150,7 +151,7 @@ def estimate(
         values,
         covariance,
         levels,
-        _condition(summed[:shown, :shown] / remembered, constant),
+        condition_of(summed[:shown, :shown] / remembered, constants),
         math.sqrt(max(0.0, float(weights @ errors)) / remembered),
         math.sqrt(float(weights @ moments.targets) / remembered),
     )
@@ -172,14 +173,18 @@ def _covariance(
     return np.asarray(inverse @ (blocks.T @ blocks) @ inverse * (whole / free))
 
 
-def _condition(mean: Array, constant: int | None) -> float:
-    """Return the smallest eigenvalue of a correlation matrix; 0 when a regressor is missing."""
-    power = np.diag(mean)
-    if constant is not None:
-        mean = mean - np.outer(mean[constant], mean[constant]) / mean[constant, constant]
-        mean, power = (np.delete(one, constant, axis=0) for one in (mean, power))
-        mean = np.delete(mean, constant, axis=1)
-    levels = np.sqrt(np.maximum(np.diag(mean), 0.0))
+def condition_of(squares: Array, constants: Sequence[int] = ()) -> float:
+    """Return the smallest eigenvalue of the correlation of regressors; 0 when one is missing.
+
+    `squares` are their sums of products. What the constant ones explain of the others is left out.
+    """
+    shown = [place for place in range(len(squares)) if place not in constants]
+    own = squares[np.ix_(shown, shown)]
+    power = np.diag(own)
+    if constants:
+        across = squares[np.ix_(shown, constants)]
+        own = own - across @ np.linalg.pinv(squares[np.ix_(constants, constants)]) @ across.T
+    levels = np.sqrt(np.maximum(np.diag(own), 0.0))
     if not np.all(levels**2 > 1e-12 * power):
         return 0.0
-    return float(max(0.0, np.linalg.eigvalsh(mean / np.outer(levels, levels))[0]))
+    return float(max(0.0, np.linalg.eigvalsh(own / np.outer(levels, levels))[0]))

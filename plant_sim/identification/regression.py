@@ -20,7 +20,7 @@ from plant_sim.identification.estimator import (
 )
 from plant_sim.identification.filters import Array, SignalFilter, low_pass
 from plant_sim.identification.record import Record
-from plant_sim.identification.structures import Equation, Structure
+from plant_sim.identification.structures import Equation, Structure, functions_of
 
 MEMORY = 3.0
 """of the filters, over their bandwidth"""
@@ -116,7 +116,7 @@ def regress(
             gain=filters.gain,
             memory_s=MEMORY / filters.bandwidth_rad_s,
             shown=len(equation.terms),
-            constant=_constant(record, structure, equation),
+            constants=constants_of(structure, equation, structure.acting(record.inputs[:1]).shape[1]),
         )
         for equation, pieces in zip(structure.equations, sums, strict=True)
     )
@@ -130,13 +130,10 @@ def regress(
 Columns = Mapping[tuple[int, int], Array]
 
 
-def _constant(record: Record, structure: Structure, equation: Equation) -> int | None:
-    """Return which of an equation's regressors is the constant 1."""
-    signal = (
-        structure.signals(record.outputs[:1]).shape[1] + structure.acting(record.inputs[:1]).shape[1]
-    )
-    places = [place for place, term in enumerate(equation.terms) if term.signal == signal]
-    return places[0] if places else None
+def constants_of(structure: Structure, equation: Equation, inputs: int) -> list[int]:
+    """Return which of an equation's regressors are the constant 1."""
+    signal = functions_of(structure) + inputs
+    return [place for place, term in enumerate(equation.terms) if term.signal == signal]
 
 
 def _rows(equation: Equation, columns: Columns, modes: list[Array]) -> tuple[Array, Array]:

@@ -265,9 +265,14 @@ def names_of(structure: Structure) -> tuple[str, ...]:
     return tuple(term.name for equation in structure.equations for term in equation.terms)
 
 
+def functions_of(structure: Structure) -> int:
+    """Return how many functions of the outputs there are: the first of the signals."""
+    return int(structure.signals(np.zeros((1, len(structure.equations)))).shape[1])
+
+
 def gains_of(structure: Structure, inputs: int) -> set[str]:
     """Return the names of the parameters that an input acts through."""
-    first = structure.signals(np.zeros((1, len(structure.equations)))).shape[1]
+    first = functions_of(structure)
     return {
         term.name
         for equation in structure.equations

@@ -30,6 +30,8 @@ from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed, sampled
 
 QUADRATURE_POINTS = 12
 SCALINGS = 2
+STARTING = (0.25, 0.75)
+"""of what the rate has above the smallest: where the search for a floor may start"""
 
 
 class RateTooLow(ValueError):
@@ -173,27 +175,29 @@ def _start(model: LinearModel, rate_nats: float) -> Matrix:
     theorem's to any.
     """
     identity = np.eye(model.states)
-    wanted = 0.5 * (rate_nats + rate_needed(model.dynamics) * LN2)
 
-    def covariance(log_gain: float) -> Matrix:
+    def at(log_gain: float) -> tuple[float, Matrix]:
         seen = identity * math.exp(log_gain)
         found = scipy.linalg.solve_continuous_are(model.dynamics.T, seen, model.noise, identity)
-        return np.asarray(0.5 * (found + found.T))
+        return 0.5 * math.exp(2.0 * log_gain) * float(np.trace(found)), np.asarray(found)
 
-    def excess(log_gain: float) -> float:
-        return 0.5 * math.exp(2.0 * log_gain) * float(np.trace(covariance(log_gain))) - wanted
-
-    return covariance(_root(excess))
+    guess = 0.5 * math.log(2.0 * rate_nats / model.states)
+    return _between(at, rate_needed(model.dynamics) * LN2, rate_nats, guess)
 
 
-def _root(rising: Callable[[float], float]) -> float:
-    """Return about where a rising function is zero."""
-    low = high = 0.0
-    while rising(low) > 0.0:
-        low -= 1.0
-    while rising(high) < 0.0:
-        high += 1.0
-    return float(scipy.optimize.brentq(rising, low, high, xtol=1e-3))
+def _between(
+    at: Callable[[float], tuple[float, Matrix]], least: float, most: float, log_gain: float
+) -> Matrix:
+    """Return the covariance at a gain whose rate is well between two; the rate rises with the gain."""
+    step = 1.0
+    while True:
+        rate, covariance = at(log_gain)
+        share = (rate - least) / (most - least)
+        if STARTING[0] < share < STARTING[1]:
+            return 0.5 * (covariance + covariance.T)
+        # Smaller steps once the rate has been passed.
+        step = step if (share < STARTING[0]) == (step > 0.0) else -0.5 * step
+        log_gain += step
 
 
 class _Flow:
@@ -247,16 +251,15 @@ class _Words:
     def start(self, rate_nats: float) -> Matrix:
         """Return a covariance strictly within: that of a filter that sees every state equally well."""
         identity, unit = np.eye(self.model.states), math.sqrt(float(np.trace(self.noise)))
-        wanted = 0.5 * (rate_nats + max(0.0, _growth_nats(self.transition)))
         basis = np.zeros((0, *self.noise.shape))
 
-        def after(log_gain: float) -> Matrix:
+        def at(log_gain: float) -> tuple[float, Matrix]:
             seen = identity * math.exp(log_gain) / unit
             ahead = scipy.linalg.solve_discrete_are(self.transition.T, seen, self.noise, identity)
             found = np.linalg.solve(identity + seen @ seen @ ahead, ahead)
-            return np.asarray(0.5 * (found + found.T))
+            return self.rate(found, basis).value, np.asarray(found)
 
-        return after(_root(lambda log_gain: self.rate(after(log_gain), basis).value - wanted))
+        return _between(at, max(0.0, _growth_nats(self.transition)), rate_nats, 0.0)
 
     def rate(self, covariance: Matrix, basis: Matrix) -> Value:
         images = self.transition @ basis @ self.transition.T

@@ -103,9 +103,16 @@ def figure_title(config: FlightConfig, summary: Summary) -> str:
 
 
 def show_summaries(
-    summaries: Sequence[Summary], folders: Sequence[RunFolder], *, verbose: bool = False
+    summaries: Sequence[Summary],
+    folders: Sequence[RunFolder],
+    *,
+    verbose: bool = False,
+    then: str | None = None,
 ) -> None:
-    """Print how flights ended; with `verbose` also every figure, the flights side by side."""
+    """Print how flights ended; with `verbose` also every figure, the flights side by side.
+
+    `then` is as for `closing_lines`.
+    """
     from rich.console import Console
 
     from tenbaud.flight.closing import closing_lines
@@ -116,7 +123,7 @@ def show_summaries(
     if verbose:
         console.print(_table(summaries))
     for summary, folder in zip(summaries, folders, strict=True):
-        lines = closing_lines(summary, folder, unicode=unicode_fits(console))
+        lines = closing_lines(summary, folder, unicode=unicode_fits(console), then=then)
         text = for_terminal("\n".join(lines))
         console.print(text, soft_wrap=True, highlight=False, markup=False)
 

@@ -18,6 +18,7 @@ from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import Row
 from tenbaud.recording.table import Table
 from tenbaud.sentences import events
+from tenbaud.sentences.flown import lockstep_text
 
 EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20
@@ -46,7 +47,8 @@ def describe(path: Path) -> list[Description]:
 def describe_text(path: Path) -> str:
     """The same for a person, as plain text; for a run folder headed by the run's figures."""
     described = describe(path)
-    parts = [_headline(path), *(_text(description) for description in described)]
+    printed: set[object] = set()
+    parts = [_headline(path), *[_text(description, printed) for description in described]]
     if not all(description.recording.complete for description in described):
         parts.append(f"`tenbaud recover {path}` repairs truncated or damaged files")
     return printable("\n\n".join(part for part in parts if part))
@@ -58,11 +60,11 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 
 def _headline(path: Path) -> str:
-    """Return `summary.json` in one line; empty without it."""
+    """Return `summary.json` in one line, or two with a narrow downlink; empty without it."""
     summary = read_summary(RunFolder(path).summary)
     if not summary:
         return ""
-    parts = [f"{summary.get('preset')}: {summary.get('outcome')}"]
+    parts, certain = [f"{summary.get('preset')}: {summary.get('outcome')}"], ""
     for name, form in (
         ("duration_s", "{:g} s"),
         ("coder_bits_up", "{:.12g} bits up"),
@@ -72,7 +74,11 @@ def _headline(path: Path) -> str:
         value = summary.get(name)
         if isinstance(value, int | float) and (value or name not in ("erasures", "desyncs")):
             parts.append(form.format(value))
-    return ", ".join(part for part in parts if part)
+    if (narrow := summary.get("narrow") or {}).get("samples_confirmed"):
+        parts.append(f"{summary['coder_bits_down']:.12g} bits down")
+        parts.append(f"{narrow['samples_confirmed']} of {summary['samples']} samples confirmed")
+        certain = f"\n  {lockstep_text(narrow)}"
+    return ", ".join(part for part in parts if part) + certain
 
 
 def _plain(description: Description) -> dict[str, Any]:
@@ -113,7 +119,8 @@ def _count(text: str | None) -> int | None:
     return int(text) if text is not None and text.isascii() and text.isdigit() else None
 
 
-def _text(description: Description) -> str:
+def _text(description: Description, printed: set[object]) -> str:
+    """Return a recording as text; of what the other end's has `printed`, only the names."""
     recording, state = description.recording, "complete"
     if not recording.complete:
         state = "damaged: these are the rows that are whole"
@@ -126,12 +133,18 @@ def _text(description: Description) -> str:
     if description.error is not None:
         lines.append(f"  {description.error}")
     lines += [f"  {note}" for note in description.notes]
+    same = [item for item in recording.metadata.items() if item in printed]
     for name, value in recording.metadata.items():
-        lines.extend(_metadata_lines(name, value))
+        if (name, value) not in printed:
+            lines.extend(_metadata_lines(name, value))
+    if same:
+        lines.append(f"  as above: {', '.join(name for name, _ in same)}")
     for topic, table in recording.topics.items():
+        known = table.channel in printed
         lines.append("")
-        lines.append(f"  {topic}: {_span(table)}")
-        lines.extend(_field_lines(table.channel))
+        lines.append(f"  {topic}: {_span(table)}{', fields as above' if known else ''}")
+        lines.extend([] if known else _field_lines(table.channel))
+    printed |= {*recording.metadata.items(), *[one.channel for one in recording.topics.values()]}
     if description.events:
         total = len(recording.topics[EVENT_TOPIC])
         shown = len(description.events)

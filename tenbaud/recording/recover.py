@@ -88,8 +88,10 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
                         raise _exists(taken)
                 unfinished.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
                 os.fsync(whole.fileno())
+                # Windows gives no open file another name.
+                whole.close()
                 if kept is not None:
-                    _keep(path, kept)
+                    _keep(path, kept, damaged)
                 unfinished.replace(target)
         except OSError as error:
             raise write_error(target, error) from error
@@ -127,13 +129,15 @@ def _unfinished(target: Path) -> Iterator[tuple[BinaryIO, Path]]:
         path.unlink(missing_ok=True)
 
 
-def _keep(path: Path, kept: Path) -> None:
-    """Give the damaged file its second name; RecordingError if that is taken meanwhile."""
+def _keep(path: Path, kept: Path, damaged: BinaryIO) -> None:
+    """Give the damaged file its second name and close it; RecordingError if the name is taken."""
     try:
         kept.hardlink_to(path)
+        damaged.close()
     except FileExistsError:
         raise _exists(kept) from None
     except OSError:  # a file system without hard links
+        damaged.close()
         path.rename(kept)
 
 

@@ -59,7 +59,7 @@ SAMPLE_CHANNEL = RecordChannel(
             "",
             "the receiver's digest of it: the last digits that were sent",
         ),
-        Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
+        Field("lag_samples", "integer", "", "samples beyond it when it was confirmed", timing=True),
         Field("about", "integers", "", "output that each symbol was about, from 0; null: erased"),
     ),
 )

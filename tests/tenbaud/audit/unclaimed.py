@@ -40,7 +40,7 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "transmitter",
         "sample",
         ("lag_samples",),
-        "when the echo came: no state depends on it",
+        "when it was confirmed: no state depends on it",
     ),
     Unclaimed(
         "transmitter",

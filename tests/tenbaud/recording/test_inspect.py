@@ -44,6 +44,19 @@ def test_a_real_run_is_headed_by_its_figures_and_its_configuration_is_readable(t
     assert described[0]["topics"]["tick"]["rows"] == 300
 
 
+def test_a_narrow_run_is_described_by_its_down_symbols_and_what_is_certain(tmp_path: Path) -> None:
+    run = flown(tmp_path / "narrow", duration_s=6.0, channel__downlink="narrow")
+    text = describe_text(run.path)
+    summary, certain = text.splitlines()[:2]
+    confirmed = run.summary["narrow"]["samples_confirmed"]
+    assert summary.endswith(f"60 bits up, 120 bits down, {confirmed} of 60 samples confirmed")
+    assert certain.startswith("  certain after ")
+    assert "echo" not in text
+    assert "  as above: preset, clock" in text, "the other end repeats nothing"
+    assert text.count("what kind of event") == text.count("its down symbols in the order of") == 1
+    assert len(text.splitlines()) < 170
+
+
 def test_cut_file_is_called_cut(tmp_path: Path, fly: Callable[..., Path]) -> None:
     path = fly(tmp_path / "run", ticks=100) / "transmitter.mcap"
     path.write_bytes(path.read_bytes()[:-100])

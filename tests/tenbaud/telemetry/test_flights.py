@@ -104,7 +104,7 @@ def controls(path: Path) -> list[str]:
 
 
 def corrupt_until_found(pair: Watched, end: str) -> None:
-    """Corrupt a codec of a narrow flight, again where the change vanished before a hash bit showed it."""
+    """Corrupt a codec of a narrow flight until it is found: one change in ten vanishes unseen."""
 
     def rejoins() -> int:
         return int(pair.newest("transmitter").counts["rejoins"])
@@ -112,8 +112,8 @@ def corrupt_until_found(pair: Watched, end: str) -> None:
     before = rejoins()
     while rejoins() == before:
         pair.send(kind="corrupt", end=end)
-        sent_s = pair.newest("transmitter").time_s
-        pair.wait(lambda: rejoins() > before or pair.newest("transmitter").time_s > sent_s + 5.0)
+        until_s = pair.newest("transmitter").time_s + 5.0
+        pair.wait(lambda end_s=until_s: rejoins() > before or pair.newest("transmitter").time_s > end_s)
 
 
 def test_when_a_narrow_flight_is_watched_then_a_corrupt_codec_of_either_end_is_found(

@@ -256,8 +256,8 @@ class _Words:
         def at(log_gain: float) -> tuple[float, Matrix]:
             seen = identity * math.exp(log_gain) / unit
             ahead = scipy.linalg.solve_discrete_are(self.transition.T, seen, self.noise, identity)
-            found = np.linalg.solve(identity + seen @ seen @ ahead, ahead)
-            return self.rate(found, basis).value, np.asarray(found)
+            found: Matrix = np.asarray(np.linalg.solve(identity + seen @ seen @ ahead, ahead), float)
+            return self.rate(found, basis).value, found
 
         return _between(at, max(0.0, _growth_nats(self.transition)), rate_nats, 0.0)
 

@@ -50,7 +50,6 @@ class FunctionPlant(SteppedPlant):
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The outputs, which follow from the state alone."""
         values = np.atleast_1d(np.asarray(self._output(0.0, self.state, self._held), dtype=float))
         return tuple(values.tolist())
 

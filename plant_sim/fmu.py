@@ -67,7 +67,6 @@ class FmuPlant:
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The outputs after the last step, in the model's order and units."""
         return self._measured
 
     def advance(self, volts: tuple[float, ...]) -> None:

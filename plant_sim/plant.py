@@ -105,7 +105,6 @@ class SteppedPlant(ABC):
         return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
     def advance(self, command: tuple[float, ...]) -> None:
-        """Do as `Plant.advance` says."""
         held = held_command(command, self._command_max)
         push = tuple([one.torque(self._steps) for one in self._disturbances]) or self._still
         self._steps += 1

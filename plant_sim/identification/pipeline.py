@@ -83,7 +83,6 @@ class Identification:
     parameters: tuple[Parameter, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Name the parameters."""
         found = self.structure.parameters(self.values, self.covariance)
         object.__setattr__(self, "parameters", tuple(found))
 

@@ -61,7 +61,6 @@ class Regression:
 
     @property
     def values(self) -> dict[str, float]:
-        """Return the parameters by name."""
         return self._named([one.values for one in self.estimates])
 
     def values_at(self, row: int) -> dict[str, float]:

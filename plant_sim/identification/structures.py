@@ -84,7 +84,6 @@ class LinearStructure:
 
     @property
     def equations(self) -> tuple[Equation, ...]:
-        """Return one equation for each output."""
         return tuple(self._equation(index) for index in range(len(self.outputs)))
 
     def _equation(self, output: int) -> Equation:
@@ -121,15 +120,12 @@ class LinearStructure:
         return f"{self.outputs[output]}''/1" if self.coupled else "d"
 
     def signals(self, outputs: Array) -> Array:
-        """Return the outputs themselves."""
         return outputs
 
     def acting(self, inputs: Array) -> Array:
-        """Return the inputs themselves."""
         return inputs
 
     def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
-        """Return the parameters by their names."""
         spread = dict(zip(values, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
         whole = names_of(replace(self, without=frozenset()))
         return [

@@ -47,7 +47,6 @@ class Symbols:
     """symbols of two values; all those of a word may make one statement"""
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return len(self.firsts) - 1
 
     @property
@@ -82,7 +81,6 @@ class Likelihood:
     drives: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        """Average the inputs over each step."""
         symbols = self.symbols
         acting = averaged(self.structure.acting(symbols.inputs), symbols.tick_s, self.lag_s)
         rows = acting.reshape(len(symbols) * self.steps, -1, acting.shape[1]).mean(axis=1)

@@ -38,7 +38,6 @@ class Program(Shared):
         """what is known by its identity"""
 
     def text(self) -> str:
-        """Return the whole program."""
         tables = [
             f"static const {kind} {name}[] = {{{', '.join(numbers)}}};"
             for (kind, numbers), name in self.tables.items()
@@ -125,7 +124,6 @@ class Argument:
     is_pointer: bool
 
     def declaration(self, is_written: bool) -> str:
-        """Return it as a prototype has it."""
         if not self.is_pointer:
             return f"{self.kind} {self.name}"
         return f"{'' if is_written else 'const '}{self.kind} *{self.name}"

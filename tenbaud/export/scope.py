@@ -80,7 +80,6 @@ class Shared(ABC):
         return name
 
     def free(self, name: str) -> str:
-        """Return a name that nothing has yet."""
         at, found = 1, name
         while found in self._names:
             at += 1
@@ -151,13 +150,11 @@ class Scope:
             )
 
     def memory(self, kind: str, size: int) -> str:
-        """Return the name of new memory."""
         name = self.temporary()
         self.declare(name, f"{kind} {name}[{max(size, 1)}]")
         return name
 
     def declarations(self) -> list[str]:
-        """Return the declarations, when it is known what is written to."""
         return [
             f"    {'const ' if root and root not in self.written else ''}{text};"
             for text, root in self.declared.values()
@@ -172,7 +169,6 @@ class Scope:
             self.refuse(node, str(error))
 
     def scalar(self, node: ast.AST, value: Value) -> Scalar:
-        """Return a value as one number."""
         match value:
             case Scalar():
                 return value
@@ -244,7 +240,6 @@ class Scope:
         return found
 
     def element(self, node: ast.AST, value: Array, index: Value) -> Value:
-        """Return an entry, or a row, at an index."""
         count, rest = value.shape[0], value.shape[1:]
         text = self.index(node, index, count)
         if not rest:

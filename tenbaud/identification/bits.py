@@ -51,7 +51,6 @@ class Bits:
 
     @property
     def config(self) -> FlightConfig:
-        """Return the configuration that flew."""
         return self.agreement.config
 
     def record(self) -> Record:

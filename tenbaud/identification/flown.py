@@ -33,7 +33,6 @@ class Flown(NamedTuple):
         return math.hypot(*shares) if self.outcome == "ok" and shares else math.inf
 
     def sentence(self) -> str:
-        """Return the figures for people."""
         if self.outcome != "ok":
             return f"the record could not be flown with it: {self.outcome}"
         parts = [

@@ -89,7 +89,6 @@ class _Reading:
         """place in the file to place in the table"""
 
     def log(self) -> Log:
-        """Return the flight log."""
         clock = self._clock()
         rows = clock.rows.stop - clock.rows.start
         if rows < ROWS_MIN:

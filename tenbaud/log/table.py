@@ -59,11 +59,9 @@ class Table:
     """where the format itself knows: "time", "index", or the name of a signal, to a column"""
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.columns[0]) if self.columns else 0
 
     def find(self, wanted: str) -> int:
-        """Return the place of a column by name or number."""
         return find_column(self.path, self.names, wanted)
 
     def only(self, wanted: Wanted | None) -> Table:

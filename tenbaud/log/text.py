@@ -66,7 +66,6 @@ class _Column:
         self._rows = 0
 
     def take(self, cells: pd.Series[Any]) -> None:
-        """Add the cells of a chunk."""
         import pandas as pd
 
         if cells.dtype.kind in "biuf" and not self.began:

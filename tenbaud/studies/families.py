@@ -35,7 +35,6 @@ class HistoryFamily:
         self.scan = tuple((*middle, size / 12.0, 0.3, 0.6) for size in range(2, 12))
 
     def at(self, shares: Sequence[float]) -> FlightConfig:
-        """Return the coder of seven shares."""
         angle, rate, growth, run, smallest, exponent, bandwidth = shares
         assert isinstance(self._table, HistoryCoderSection)
         rows = [
@@ -78,7 +77,6 @@ class DirectionFamily:
         self.scan = tuple((size / 20.0, 0.5, 0.5, 0.5) for size in range(2, 19))
 
     def at(self, shares: Sequence[float]) -> FlightConfig:
-        """Return the coder of four shares."""
         strength = between(*self.STRENGTH, shares[0])
         coder = self._coder.model_copy(
             update={

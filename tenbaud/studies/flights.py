@@ -170,7 +170,6 @@ class CompiledPoint:
         )
 
     def _figures(self, schedule: Schedule) -> FlightFigures:
-        """Return the figures that a study keeps of the flight."""
         numbers, work = self.numbers, self._work
         coded, live = work.counted.tolist()
         followed = numbers.ticks - numbers.window_start
@@ -206,7 +205,6 @@ class CompiledPoint:
         return clean
 
     def given(self, schedule: Schedule, agreement: Agreement) -> Given:
-        """Return the inputs of a flight."""
         plant = self._plant
         if self._pushed and agreement is not self.agreement:
             plant = build_plant(agreement.config, agreement.config.timing.tick_s, agreement.signals)

@@ -45,7 +45,6 @@ class Augment:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse invalid settings."""
         if not self.scales or min(self.scales) <= 0.0:
             raise StudyError(f"scales are sizes above 0, got {self.scales}")
         if self.shoves < 0.0 or self.phases < 1:

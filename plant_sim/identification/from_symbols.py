@@ -19,7 +19,7 @@ from plant_sim.identification.filters import Array
 from plant_sim.identification.maximum import Maximum, climb
 from plant_sim.identification.pipeline import Identification, doubts, uncertain
 from plant_sim.identification.regression import Filters, Regression, constants_of
-from plant_sim.identification.structures import PitchStructure, Structure, holding, names_of
+from plant_sim.identification.structures import PitchStructure, Structure, names_of
 from plant_sim.identification.symbols import Likelihood, Symbols, likelihood
 
 GUESSED = -math.log(2.0)
@@ -68,12 +68,11 @@ def identify_symbols(
     notes = []
     values, covariance = _estimate(found, structure)
     spread = math.sqrt(max(0.0, covariance[0, 0]))
-    damped = isinstance(structure, PitchStructure) and "a_w" in values
-    if damped and -3.0 * spread < values["a_w"] < 0.0:
+    if isinstance(structure, PitchStructure) and -3.0 * spread < values.get("a_w", 0.0) < 0.0:
         notes.append(
             f"a_w = {values['a_w']:.2g} +- {spread:.2g} is 0 within its uncertainty: held at 0"
         )
-        structure = holding(structure, {"a_w"})
+        structure = replace(structure, damped=False)
         chance = replace(chance, structure=structure)
         found = climb(chance, found.point[1:], scale[1:])
         values, covariance = _estimate(found, structure)

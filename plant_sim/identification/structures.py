@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -75,7 +75,6 @@ class LinearStructure:
     integrates: bool = False
     """the outputs' own terms are 0"""
     coupled: bool = False
-    without: frozenset[str] = frozenset()
 
     @property
     def order(self) -> int:
@@ -100,8 +99,7 @@ class LinearStructure:
                 for derivative in range(self.input_order, -1, -1)
             ]
         terms.append(Term(self._offset(output), constant, 0))
-        kept = tuple(term for term in terms if term.name not in self.without)
-        return Equation(output, self.n, kept)
+        return Equation(output, self.n, tuple(terms))
 
     def _own(self, output: int, other: int, derivative: int) -> str:
         if not self.coupled:
@@ -127,9 +125,9 @@ class LinearStructure:
 
     def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
         spread = dict(zip(values, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
-        whole = names_of(replace(self, without=frozenset()))
         return [
-            Parameter(name, name, "", values.get(name, 0.0), spread.get(name, 0.0)) for name in whole
+            Parameter(name, name, "", values.get(name, 0.0), spread.get(name, 0.0))
+            for name in names_of(self)
         ]
 
     def state_space(self, values: Mapping[str, float]) -> StateSpace:
@@ -183,7 +181,8 @@ class PitchStructure:
     equilibrium_rad: float | None = None
     volts_max: float = math.inf
     """where each motor saturates: commands beyond it have no further effect"""
-    without: frozenset[str] = frozenset()
+    damped: bool = True
+    """False: a_w is held at 0"""
 
     kind = "pitch"
     order = 2
@@ -194,8 +193,8 @@ class PitchStructure:
         pulls: tuple[Term, ...] = (Term("a_th", 1, 0, -1.0),)
         if self.equilibrium_rad is None:
             pulls = (Term(COSINE, 1, 0, -1.0), Term(SINE, 2, 0))
-        terms = (Term("a_w", 0, 1, -1.0), *pulls, Term("k_v", 1 + len(pulls), 0))
-        return (Equation(0, 2, tuple(term for term in terms if term.name not in self.without)),)
+        damping = (Term("a_w", 0, 1, -1.0),) if self.damped else ()
+        return (Equation(0, 2, (*damping, *pulls, Term("k_v", 1 + len(pulls), 0))),)
 
     def signals(self, outputs: Array) -> Array:
         """Return theta and sin(theta - theta_0), or theta, its sine and its cosine."""
@@ -249,11 +248,6 @@ class PitchStructure:
 
 
 Structure: TypeAlias = PitchStructure | LinearStructure
-
-
-def holding(structure: Structure, names: set[str]) -> Structure:
-    """Return a structure with more parameters held at 0."""
-    return replace(structure, without=structure.without | names)
 
 
 def names_of(structure: Structure) -> tuple[str, ...]:

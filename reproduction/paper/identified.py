@@ -45,13 +45,7 @@ class Trials:
 
 def clean_trial(excitation: str) -> Identified:
     """Run one experiment without noise, on the simulated rig with a ten-bit encoder."""
-    options = Options(
-        MOTOR_LAG_S,
-        PAPER_FILTERS.bandwidth_rad_s,
-        forgetting_per_s=PAPER_FILTERS.forgetting_per_s,
-        gain=PAPER_FILTERS.gain,
-        rests=True,
-    )
+    options = Options(MOTOR_LAG_S, PAPER_FILTERS.bandwidth_rad_s, PAPER_FILTERS)
     return run(excitation, record_of(excitation, CLEAN_S), Wanted(equilibrium="quiet", options=options))
 
 

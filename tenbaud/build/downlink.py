@@ -81,7 +81,7 @@ def build_two_way(
 
     `parts` take the place of the configured ones. ConfigError for what cannot be flown.
     """
-    if terms.downlink != "narrow":
+    if not terms.is_narrow:
         return BuiltDownlink(None, None)
     try:
         _require_own_fields(config, terms.is_mirrored)
@@ -180,7 +180,7 @@ def _queue(config: FlightConfig, terms: Terms, needed: int) -> int:
             )
         return samples
     # The transmitter has to know it in time as well.
-    trip_ns = terms.down_heard_ns + parse_impairments(config.link.impairments).longest_delay_ns
+    trip_ns = terms.heard_ns + parse_impairments(config.link.impairments).longest_delay_ns
     late_ns = trip_ns - terms.sample_ns - terms.lead_ticks * terms.tick_ns
     return needed + max(0, -(-late_ns // terms.sample_ns))
 

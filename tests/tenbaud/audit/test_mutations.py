@@ -93,8 +93,8 @@ def test_every_change_of_a_flight_is_found(tmp_path: Path) -> None:
 
 
 def test_every_change_of_a_narrow_flight_is_found(tmp_path: Path) -> None:
-    narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.03"}
-    run = flown(tmp_path / "run", duration_s=3.4, **narrow)
+    narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.05"}
+    run = flown(tmp_path / "run", duration_s=2.0, **narrow)
     tried, found, missed = survey(run.path, tmp_path / "mutant", 1)
     assert tried > 110
     assert not missed, "\n".join([f"seed {SEED}", *missed])

@@ -94,7 +94,10 @@ Mismatch = Annotated[
 LineRate = Annotated[int | None, typer.Option(help="Bits per second on the serial line (115200).")]
 Downlink = Annotated[
     str | None,
-    typer.Option(help="Separate link for the commands: zenoh, or a second serial port."),
+    typer.Option(
+        help="With --link serial: separate link for the commands, zenoh or a second port. What comes "
+        "down is --set channel.downlink=narrow, compact or full."
+    ),
 ]
 Rig = Annotated[str | None, typer.Option(help=rigs.FORMS)]
 Disturbance = Annotated[

@@ -117,11 +117,13 @@ class ReceiverEndpoint:
         if frame is None:
             return []
         if isinstance(frame, ShortSymbol) and session.due_slot is not None:
-            frame = self._slots.located(frame, session.due_slot, now_ns)
+            frame = self._slots.find(frame, session.due_slot, now_ns)
         answers = session.on_frame(frame, now_ns)
         if isinstance(frame, Hello):
-            sizes = [self.inlet.wire.size(self.inlet.wire.encode(answer)) for answer in answers]
-            self._slots.answered(frame, answers, now_ns + sum(sizes) * session.terms.downlink_byte_ns)
+            wire, terms = self.inlet.wire, session.terms
+            asked_ns = now_ns - wire.size(data) * terms.uplink_line_ns
+            size = sum([wire.size(wire.encode(answer)) for answer in answers])
+            self._slots.answered(frame, answers, asked_ns, now_ns + size * terms.downlink_byte_ns)
         return answers
 
 

@@ -117,7 +117,7 @@ class TransmitterNode:
         if not self.session.following.unrecorded:
             return
         per_sample = self.session.terms.ticks_per_sample
-        for done in self.session.take_confirmed():
+        for done in self.session.following.take_confirmed():
             pairs = zip(done.flown.coded, done.live, strict=True)
             self.scores.on_word(done.word, done.about)
             for tick, (coded, live) in enumerate(pairs, done.sample * per_sample):
@@ -228,7 +228,7 @@ class TransmitterNode:
 
 def _down_slots(session: TransmitterSession) -> SlotFinder | None:
     """Return what finds the slots of symbol bytes that come down; None where none come."""
-    if session.terms.downlink != "narrow":
+    if not session.terms.is_narrow:
         return None
     finder = SlotFinder(session.terms.down_grid)
     finder.expect(session.line_delay_ns)

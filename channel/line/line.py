@@ -179,7 +179,7 @@ class Downlink(Outlet):
         terms: Terms | None = None,
         recorder: Recorder | None = None,
     ) -> None:
-        grid = terms.down_grid if terms is not None and terms.downlink == "narrow" else None
+        grid = terms.down_grid if terms is not None and terms.is_narrow else None
         super().__init__(wire, grid, bits_per_symbol(DOWN_ALPHABET), DOWN_SENT_CHANNEL, recorder)
         self.line: Line = line or CleanLine()
         self._delivery_ns = 0 if grid is None else grid.delivery_ns

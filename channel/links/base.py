@@ -42,6 +42,8 @@ class Link(ABC):
     """of the kind of link, for summaries"""
     wire: Wire = DATAGRAM
     """how frames look on this kind of line"""
+    start_ns: int | None = None
+    """how soon after the answer to its request a flight has to begin; None: at any time"""
 
     def __init__(self) -> None:
         self._counts = LinkCounts()

@@ -33,6 +33,14 @@ UP = ("up/symbol", "up/control")
 DOWN = ("down/command",)
 TELEMETRY = ("telemetry/transmitter", "telemetry/receiver")
 CONTROL = ("control",)
+_WATCHED = (*UP, *DOWN, *TELEMETRY)
+_KEYS_OF: dict[Part, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "transmitter": (UP, DOWN),
+    "receiver": (DOWN, UP),
+    "viewer": ((), _WATCHED),
+    "operator": (CONTROL, _WATCHED),
+}
+"""what each part may send, and may be sent"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,55 +118,31 @@ def access_rules(invited: Sequence[Invited]) -> dict[str, object]:
 
 
 def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
-    own = invited.session
     rules: list[Rule] = []
 
-    def allow(flow: str, messages: Sequence[str], session: str, *keys: str) -> None:
-        rules.append(
-            {
-                "id": f"{prefix} {len(rules)}",
-                "permission": "allow",
-                "flows": [flow],
-                "messages": list(messages),
-                "key_exprs": [f"{KEY_ROOT}/{session}/{key}" for key in keys],
-            }
-        )
+    def allow(flow: str, messages: list[str], session: str, keys: Sequence[str]) -> None:
+        if keys:
+            expressions = [f"{KEY_ROOT}/{session}/{key}" for key in keys]
+            rules.append(
+                {
+                    "id": f"{prefix} {len(rules)}",
+                    "permission": "allow",
+                    "flows": [flow],
+                    "messages": messages,
+                    "key_exprs": expressions,
+                }
+            )
 
-    def may_send(*keys: str) -> None:
-        allow("ingress", ["put"], own, *keys)
-        allow("egress", ["declare_subscriber"], ANY, *_subscribed(keys))
-
-    def may_be_sent(*keys: str) -> None:
-        allow("egress", ["put"], own, *keys)
-        allow("ingress", ["declare_subscriber"], ANY, *_subscribed(keys))
-
-    def may_be_alive(part: str) -> None:
-        alive = f"alive/{part}/*"
-        allow("ingress", ["liveliness_token"], own, alive)
-        allow("egress", ["declare_liveliness_subscriber", "liveliness_query"], ANY, alive)
-
-    def may_see_alive(part: str) -> None:
-        alive = f"alive/{part}/*"
-        allow("egress", ["liveliness_token"], own, alive)
-        allow("ingress", ["declare_liveliness_subscriber", "liveliness_query"], ANY, alive)
-
-    match invited.part:
-        case "transmitter":
-            may_send(*UP)
-            may_be_sent(*DOWN)
-            may_be_alive("transmitter")
-            may_see_alive("receiver")
-        case "receiver":
-            may_send(*DOWN)
-            may_be_sent(*UP)
-            may_be_alive("receiver")
-            may_see_alive("transmitter")
-        case "viewer" | "operator":
-            may_be_sent(*UP, *DOWN, *TELEMETRY)
-            may_see_alive("transmitter")
-            may_see_alive("receiver")
-            if invited.part == "operator":
-                may_send(*CONTROL)
+    sends, is_sent = _KEYS_OF[invited.part]
+    inward, outward = ("ingress", "egress"), ("egress", "ingress")
+    for (flow, back), keys in ((inward, sends), (outward, is_sent)):
+        allow(flow, ["put"], invited.session, keys)
+        allow(back, ["declare_subscriber"], ANY, _subscribed(keys))
+    for part in ("transmitter", "receiver"):
+        flow, back = inward if part == invited.part else outward
+        alive = [f"alive/{part}/*"]
+        allow(flow, ["liveliness_token"], invited.session, alive)
+        allow(back, ["declare_liveliness_subscriber", "liveliness_query"], ANY, alive)
     return rules
 
 

@@ -137,7 +137,7 @@ EVENT_CHANNEL = RecordChannel(
         Field("value", "number", "", "angle (rad), symbols per second, pace: what the cause is about"),
         Field("limit", "number", "", "what the value should keep to"),
         Field("missed_share", "number", "", "share of this process' ticks that it missed"),
-        Field("overdue_share", "number", "", "share of the other ticks with echoes overdue"),
+        Field("overdue_share", "number", "", "share of the other ticks with answers overdue"),
         Field("transmitter_digest", "string", "", "of the sample, where the two differ"),
         Field("receiver_digest", "string", "", "of the sample, where the two differ"),
         Field("detail", "string", "", "for people: what a peer, a device or a plugin said"),

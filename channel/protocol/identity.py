@@ -10,13 +10,14 @@ in flight.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import blake2b
 from struct import pack
 from typing import Any
 
 from channel.codec import numerics
-from channel.codec.codec import ERASED, Codec, Word
+from channel.codec.codec import ERASED, Alphabet, Codec, Word
 from channel.codec.downlink.machine import TwoWay
 from channel.errors import CodecDiverged
 
@@ -54,19 +55,14 @@ def numerics_probe(codec: Codec, two_way: TwoWay | None = None) -> bytes:
     for point in range(-PROBE_POINTS, PROBE_POINTS):
         x = point * 0.0537109375
         digest.update(pack("<3d", numerics.sin(x), numerics.cos(x), numerics.exp(x)))
-    symbols = codec.coder.alphabet.symbols
+    alphabet = codec.coder.alphabet
     state = codec.initial()
-    noise = 1
+    noise = _noise()
     for sample in range(PROBE_SAMPLES):
-        symbols_of_word = []
-        for _ in range(codec.coder.alphabet.symbols_per_word):
-            noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
-            symbols_of_word.append(symbols[(noise >> 16) % len(symbols)])
-        word: Word = ERASED if sample % 7 == 6 else tuple(symbols_of_word)
+        word = _probe_word(alphabet, sample, [next(noise) for _ in range(alphabet.symbols_per_word)])
         commands = []
         for _ in range(codec.ticks_per_sample):
-            noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
-            value = ((noise >> 12) % 9_001 - 4_500) / 1000.0
+            value = ((next(noise) >> 12) % 9_001 - 4_500) / 1000.0
             signs = (1.0 if index % 2 == 0 else -1.0 for index in range(codec.model.input_size))
             commands.append(tuple(sign * value for sign in signs))
         try:
@@ -80,21 +76,29 @@ def numerics_probe(codec: Codec, two_way: TwoWay | None = None) -> bytes:
     return digest.digest()
 
 
+def _noise() -> Iterator[int]:
+    """Return numbers of 31 bits without end, the same on every machine."""
+    noise = 1
+    while True:
+        noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
+        yield noise
+
+
+def _probe_word(alphabet: Alphabet, sample: int, drawn: list[int]) -> Word:
+    symbols = alphabet.symbols
+    return ERASED if sample % 7 == 6 else tuple([symbols[(one >> 16) % len(symbols)] for one in drawn])
+
+
 def _run_two_way(two_way: TwoWay, digest: blake2b) -> None:
     """Run the state machine over fixed words and command symbols."""
     alphabet = two_way.codec.coder.alphabet
     state = two_way.initial()
-    noise = 1
+    noise = _noise()
     for sample in range(PROBE_SAMPLES_BOTH_WAYS):
-        drawn = []
-        for _ in range(alphabet.symbols_per_word + two_way.commands_in(state)):
-            noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
-            drawn.append(noise >> 16)
-        letters = drawn[: alphabet.symbols_per_word]
-        word = tuple([alphabet.symbols[one % len(alphabet.symbols)] for one in letters])
-        bits = [one & 1 for one in drawn[len(letters) :]]
+        word = _probe_word(alphabet, sample, [next(noise) for _ in range(alphabet.symbols_per_word)])
+        bits = [next(noise) >> 16 & 1 for _ in range(two_way.commands_in(state))]
         try:
-            state = two_way.step(state, ERASED if sample % 7 == 6 else word, bits).state
+            state = two_way.step(state, word, bits).state
         except (CodecDiverged, ValueError, ArithmeticError):
             first = two_way.initial()
             state = first._replace(codec=first.codec._replace(sample=sample + 1))

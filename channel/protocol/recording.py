@@ -82,6 +82,14 @@ SENT_CHANNEL = _sent("symbol", *_UP)
 ARRIVED_CHANNEL = _arrived("symbol", *_UP)
 DOWN_SENT_CHANNEL = _sent("down_symbol", *_DOWN)
 
+WORD = Field("word", "integers", "", "symbols as the receiver consumed them; null: erased")
+AFTER_SAMPLE = (
+    Field("range", "numbers", "", "range M of each output before the word"),
+    Field("state", "numbers", "", "codec's model state after the sample"),
+    Field("coder", "numbers", "", "coder state after the sample"),
+    Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
+)
+
 EPOCH_CHANNEL = RecordChannel(
     "epoch",
     (

@@ -214,13 +214,17 @@ class Terms:
             ahead_ns=2 * sample_ns + self.deadline_allowance_ns,
         )
 
-    def down_slot_ns(self, slot: int) -> int:
-        """Return the flight time at which a slot of the narrow downlink begins."""
-        return self.down_grid.slot_ns(slot)
+    @property
+    def is_narrow(self) -> bool:
+        """Return whether symbols go down, and no frames of commands."""
+        return self.downlink == "narrow"
 
     @property
-    def down_heard_ns(self) -> int:
-        """Return how long after a sample's first tick all its down symbols have come."""
+    def heard_ns(self) -> int:
+        """Return how long after a sample's first tick its commands, or down symbols, have come."""
+        word_ns = self.uplink_delivery_ns + self.uplink_line_ns + self.deadline_allowance_ns
+        if not self.is_narrow:
+            return word_ns + self.downlink_line_ns + self.downlink_budget_ns
         grid = self.down_grid
         return grid.due_ns(grid.slots - 1) + grid.allowance_ns
 
@@ -229,11 +233,7 @@ class Terms:
 
         `line_delay_ns`: by how much the two lines may delay messages beyond what is agreed here.
         """
-        if self.downlink == "narrow":
-            return self.down_heard_ns + self.symbol_delay_ns + line_delay_ns
-        agreed_ns = self.uplink_delivery_ns + self.symbol_delay_ns + self.uplink_line_ns
-        agreed_ns += self.deadline_allowance_ns + self.downlink_budget_ns + self.downlink_line_ns
-        return agreed_ns + line_delay_ns
+        return self.heard_ns + self.symbol_delay_ns + line_delay_ns
 
     def samples_in(self, time_ns: int, at_least: int) -> int:
         """Return a time as a number of samples, rounded up, and no fewer than `at_least`."""
@@ -247,24 +247,18 @@ class Terms:
     @property
     def confirmation_samples(self) -> int:
         """Return by how many samples confirmations may lag."""
-        if self.downlink == "narrow":
-            return max(NARROW_LAG_SAMPLES, self.history_samples)
-        return self.history_samples
+        return max(NARROW_LAG_SAMPLES if self.is_narrow else 0, self.history_samples)
 
     @property
     def lead_needed_ticks(self) -> int:
         """Return the smallest `D` with which every command can be in time on a real clock."""
         if self.is_mirrored:
             return 0
-        if self.downlink == "narrow":
-            return -(-self.down_heard_ns // self.tick_ns)
-        needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
-        needed += self.uplink_line_ns + self.downlink_line_ns
-        return max(1, -(-needed // self.tick_ns))
+        return max(0 if self.is_narrow else 1, -(-self.heard_ns // self.tick_ns))
 
     def with_shortest_lead(self, clock: Clock) -> Terms:
         """Return these terms with the smallest lead that `check` allows on this clock."""
-        ideal = clock == "virtual" and self.uplink_delivery_ns == 0 and self.downlink != "narrow"
+        ideal = clock == "virtual" and self.uplink_delivery_ns == 0 and not self.is_narrow
         return replace(self, lead_ticks=0 if ideal else self.lead_needed_ticks)
 
     def check(self, clock: Clock) -> None:
@@ -283,7 +277,7 @@ class Terms:
                 f"value(s) and there are {len(self.limits.command_max)} limit(s)"
             )
         require_carried("the initial command", self.initial_command, self.signals)
-        if self.downlink == "narrow":
+        if self.is_narrow:
             Layout(self.down_symbols, command_period=2).check_rate(self.downlink_baud, self.sample_ns)
         compact = self.downlink == "compact"
         per_step = steps_held(self.limits, self.signals) if compact else (1,) * inputs
@@ -309,10 +303,8 @@ class Terms:
 
     def _lead_parts(self) -> str:
         """Return what a command waits for."""
-        if self.downlink == "narrow":
-            return (
-                f"down symbols, which are all there {self.down_heard_ns / 1e6:.4g} ms after a sample,"
-            )
+        if self.is_narrow:
+            return f"down symbols, which are all there {self.heard_ns / 1e6:.4g} ms after a sample,"
         line = ""
         if self.uplink_line_ns or self.downlink_line_ns:
             line = (

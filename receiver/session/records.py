@@ -7,7 +7,7 @@ from collections.abc import Callable
 from channel.codec.codec import CodecState, Vector, Word
 from channel.codec.lead import FlownSample
 from channel.protocol.frames import Symbol
-from channel.protocol.recording import ARRIVED_CHANNEL, Field, RecordChannel, Recorder
+from channel.protocol.recording import AFTER_SAMPLE, ARRIVED_CHANNEL, Field, RecordChannel, Recorder
 from channel.protocol.terms import Terms
 
 ReferencesOf = Callable[[int], tuple[float | None, ...]]
@@ -28,10 +28,7 @@ SAMPLE_CHANNEL = RecordChannel(
     (
         Field("sample", "integer", "", "index of the sample"),
         Field("word", "integers", "", "symbols consumed; null: erased"),
-        Field("range", "numbers", "", "range M of each output before the word"),
-        Field("state", "numbers", "", "codec's model state after the sample"),
-        Field("coder", "numbers", "", "coder state after the sample"),
-        Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
+        *AFTER_SAMPLE,
         Field("arrival_s", "number", "s", "when the word was decided, on this clock", timing=True),
     ),
 )

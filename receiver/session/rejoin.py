@@ -81,7 +81,7 @@ class Greeter:
     def __init__(self, terms: Terms) -> None:
         self._answer_age_max = terms.samples_in(ANSWER_AGE_NS, ANSWER_AGE_SAMPLES_MAX)
         self._lead_agreed = _lead_samples(terms)
-        self._may_double = terms.downlink == "narrow"
+        self._may_double = terms.is_narrow
         self._lead = 0
         """of the last answer, in samples"""
         self._answered: Hello | None = None

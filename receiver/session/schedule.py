@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from enum import Enum, auto
 from typing import NamedTuple
 
+from channel.protocol.rivals import Rivals
 from channel.protocol.terms import Terms
 from receiver.session.commander import Standing
 
@@ -31,10 +32,8 @@ GAIN = 1.0 / 16.0
 DRIFT = 1e-3
 """How much two clocks may drift apart, as a share of the time since the last symbol."""
 
-RIVALS = 3
 RIVAL_SLOTS = 0.9
-"""How far the distance of two symbols may be off the slots between them. Below one, so that symbols of
-different slots that come together are never taken for a schedule."""
+"""How far the distance of two symbols may be off the slots between them."""
 
 
 class Timing(Enum):
@@ -44,12 +43,6 @@ class Timing(Enum):
     EARLY = auto()
     NEW = auto()
     """the last of a row that replaces the schedule"""
-
-
-class _Rival(NamedTuple):
-    slot: int
-    time_ns: int
-    in_a_row: int
 
 
 class Schedule:
@@ -66,14 +59,14 @@ class Schedule:
         """when the last symbol came; None: before the first epoch nothing is known"""
         self._is_guess = True
         """whether no symbol of the epoch has come, so that `_zero_ns` is the earliest that can be"""
-        self._rival: _Rival | None = None
+        self._rivals = Rivals(self._slot_ns, RIVAL_SLOTS)
 
     def begin(self, slot: int, now_ns: int) -> None:
         """Begin an epoch at a slot that is not due before now."""
         self._zero_ns = now_ns - self._terms.slot_ns(slot)
         self._heard_ns = now_ns
         self._is_guess = True
-        self._rival = None
+        self._rivals.clear()
 
     def flight_ns(self, now_ns: int) -> int:
         """Return the flight time as this end knows it: a way up later than at the transmitter."""
@@ -92,14 +85,7 @@ class Schedule:
 
     def is_replaced_by(self, slot: int, now_ns: int) -> bool:
         """Note a symbol that does not fit; return whether it is the last of an accepted row."""
-        rival = self._rival
-        count = 1
-        if rival is not None:
-            slots = (now_ns - rival.time_ns) / self._slot_ns
-            if slot > rival.slot and abs(slot - rival.slot - slots) <= RIVAL_SLOTS:
-                count = rival.in_a_row + 1
-        self._rival = _Rival(slot, now_ns, count)
-        return count >= RIVALS
+        return self._rivals.complete(slot, now_ns)
 
     def take(self, slot: int, now_ns: int, *, anew: bool = False) -> tuple[int, int]:
         """Take a symbol; return the (slot, time) that the next deadlines count from.
@@ -115,7 +101,7 @@ class Schedule:
         self._zero_ns += round(GAIN * max(-largest_ns, min(largest_ns, off_ns)))
         self._heard_ns = now_ns
         self._is_guess = False
-        self._rival = None
+        self._rivals.clear()
         return slot, now_ns - off_ns if early else now_ns
 
     def _early(self, slot: int, now_ns: int) -> float:

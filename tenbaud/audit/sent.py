@@ -30,8 +30,8 @@ def check_slots(evidence: Evidence) -> None:
     """At most one symbol a slot, in the order of slots, each while its slot lasts."""
     terms = evidence.terms
     _check_slots(evidence, SENDS[0], terms.slot_ns, len(evidence.alphabet.symbols))
-    if terms.downlink == "narrow":
-        _check_slots(evidence, SENDS[1], terms.down_slot_ns, 2)
+    if terms.is_narrow:
+        _check_slots(evidence, SENDS[1], terms.down_grid.slot_ns, 2)
 
 
 def _check_slots(

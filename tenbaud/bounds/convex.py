@@ -19,6 +19,8 @@ ACCURACY = 1e-10
 WEIGHT_GROWTH = 12.0
 NEWTON_STEPS_MAX = 80
 DECREMENT = 1e-7
+QUADRATIC = 1e-2
+"""decrement below which a full step gains: one that does not has met the rounding of the value"""
 HALVINGS_MAX = 60
 
 
@@ -130,7 +132,7 @@ def _centre(barrier: _Barrier, point: Matrix, weight: float) -> Matrix:
             return point
         direction = np.tensordot(step, barrier.basis, 1)
         length = 1.0
-        for _ in range(HALVINGS_MAX):
+        for _ in range(HALVINGS_MAX if decrement > QUADRATIC else 1):
             there = point + length * direction
             after = barrier.at(there, weight)
             if after.value <= here.value - 0.1 * length * decrement:

@@ -30,6 +30,8 @@ from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed, sampled
 
 QUADRATURE_POINTS = 12
 SCALINGS = 2
+STARTING = (0.25, 0.75)
+"""of what the rate has above the smallest: where the search for a floor may start"""
 
 
 class RateTooLow(ValueError):
@@ -170,22 +172,18 @@ def _start(model: LinearModel, rate_nats: float) -> Matrix:
     theorem's to any.
     """
     identity = np.eye(model.states)
-    wanted = 0.5 * (rate_nats + rate_needed(model.dynamics) * LN2)
-
-    def covariance(log_gain: float) -> Matrix:
+    least = rate_needed(model.dynamics) * LN2
+    log_gain, step = 0.5 * math.log(2.0 * rate_nats / model.states), 1.0
+    while True:
         seen = identity * math.exp(log_gain)
         found = scipy.linalg.solve_continuous_are(model.dynamics.T, seen, model.noise, identity)
-        return np.asarray(0.5 * (found + found.T))
-
-    def excess(log_gain: float) -> float:
-        return 0.5 * math.exp(2.0 * log_gain) * float(np.trace(covariance(log_gain))) - wanted
-
-    low = high = 0.0
-    while excess(low) > 0.0:
-        low -= 1.0
-    while excess(high) < 0.0:
-        high += 1.0
-    return covariance(scipy.optimize.brentq(excess, low, high, xtol=1e-3))
+        rate = 0.5 * math.exp(2.0 * log_gain) * float(np.trace(found))
+        share = (rate - least) / (rate_nats - least)
+        if STARTING[0] < share < STARTING[1]:
+            return np.asarray(0.5 * (found + found.T))
+        # Smaller steps once the rate has been passed.
+        step = step if (share < STARTING[0]) == (step > 0.0) else -0.5 * step
+        log_gain += step
 
 
 class _Flow:

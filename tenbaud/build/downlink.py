@@ -25,13 +25,15 @@ from receiver.controllers.base import Controller
 from receiver.controllers.pid import PidLoops
 from receiver.controllers.state_feedback import StateFeedback
 from tenbaud.build.controllers import build_controller, rate_states
+from tenbaud.build.parts import Parts
 from tenbaud.build.references import ANNOUNCED_SAMPLES_MAX
 from tenbaud.build.set_point_ranges import set_point_ranges
-from tenbaud.config.downlink import DownlinkSection, StateLawSection
+from tenbaud.config.downlink import OF_SCHEME, DownlinkSection, StateLawSection
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
-MIRRORED = ("pid", "state_feedback")
+DESIGNED = "state_feedback"
+MIRRORED = ("pid", DESIGNED)
 """Controllers that are built in as laws in the codec's arithmetic."""
 Description = dict[str, Any]
 
@@ -62,19 +64,30 @@ def _is_mirrored(config: FlightConfig, controller: Controller | None) -> bool:
     return config.receiver.controller in MIRRORED
 
 
+def designed_law(config: FlightConfig) -> Description | None:
+    """Return the section `downlink.law`; None where no state feedback runs at both ends."""
+    narrow, designed = config.channel.downlink == "narrow", config.receiver.controller == DESIGNED
+    if not (narrow and designed and _is_mirrored(config, None)):
+        return None
+    controller = build_controller(config)
+    assert isinstance(controller, StateFeedback)
+    return controller.law._asdict()
+
+
 def build_two_way(
-    config: FlightConfig, codec: Codec, terms: Terms, controller: Controller | None = None
+    config: FlightConfig, codec: Codec, terms: Terms, parts: Parts | None = None
 ) -> BuiltDownlink:
     """Return the state machine of the narrow downlink, if it is narrow.
 
-    `controller` takes the place of the configured one. ConfigError for what cannot be flown.
+    `parts` take the place of the configured ones. ConfigError for what cannot be flown.
     """
-    if terms.downlink != "narrow":
+    if not terms.is_narrow:
         return BuiltDownlink(None, None)
     try:
+        _require_own_fields(config, terms.is_mirrored)
         layout = _layout(config.downlink, terms)
         build = _mirrored if terms.is_mirrored else _coded
-        scheme, description = build(config, codec, terms, layout, controller)
+        scheme, description = build(config, codec, terms, layout, parts or Parts())
         two_way = two_way_of(codec, terms, scheme, layout)
     except ValueError as error:
         raise ConfigError(f"the narrow downlink: {error}") from error
@@ -110,6 +123,20 @@ def said_by_words(two_way: TwoWay | None) -> dict[int, tuple[float, float]]:
     return {one.output: (one.low, one.high) for one in ranges}
 
 
+def _require_own_fields(config: FlightConfig, is_mirrored: bool) -> None:
+    """Raise ConfigError for a field of the other scheme, which would change nothing."""
+    section, fields = config.downlink, DownlinkSection.model_fields
+    flown, other = ("mirrored", "coded") if is_mirrored else ("coded", "mirrored")
+    unused = [one for one in OF_SCHEME[other] if getattr(section, one) != fields[one].default]
+    if unused:
+        names = ", ".join(f"downlink.{one}" for one in unused)
+        raise ConfigError(
+            f'{names}: only for the scheme "{other}"; downlink.scheme = "{section.scheme}" with the '
+            f'controller {config.receiver.controller} is "{flown}": leave it out, or set '
+            f'downlink.scheme = "{other}"'
+        )
+
+
 def _layout(section: DownlinkSection, terms: Terms) -> Layout:
     period = section.command_period
     if period == "auto":
@@ -119,10 +146,11 @@ def _layout(section: DownlinkSection, terms: Terms) -> Layout:
 
 
 def _mirrored(
-    config: FlightConfig, codec: Codec, terms: Terms, layout: Layout, given: Controller | None
+    config: FlightConfig, codec: Codec, terms: Terms, layout: Layout, parts: Parts
 ) -> tuple[MirroredLaw, Description]:
     """Return the scheme with the law in it."""
-    controller = given or build_controller(config, model=codec.model)
+    controller = parts.controller or build_controller(config, model=codec.model)
+    given = parts.controller if parts.has_own_set_points else None
     law, described = _law(config, controller, codec, terms)
     ranges = set_point_ranges(config, codec, terms.signals, given)
     bits, outputs = config.downlink.bits, len(terms.signals.outputs)
@@ -152,7 +180,7 @@ def _queue(config: FlightConfig, terms: Terms, needed: int) -> int:
             )
         return samples
     # The transmitter has to know it in time as well.
-    trip_ns = terms.down_heard_ns + parse_impairments(config.link.impairments).longest_delay_ns
+    trip_ns = terms.heard_ns + parse_impairments(config.link.impairments).longest_delay_ns
     late_ns = trip_ns - terms.sample_ns - terms.lead_ticks * terms.tick_ns
     return needed + max(0, -(-late_ns // terms.sample_ns))
 
@@ -165,8 +193,7 @@ def _law(
     if config.downlink.law != StateLawSection() and not isinstance(controller, StateFeedback):
         raise ConfigError(
             "downlink.law has the numbers of a state feedback, and the controller is "
-            f"{config.receiver.controller}: leave it out, or set receiver.controller = "
-            '"state_feedback"'
+            f'{config.receiver.controller}: leave it out, or set receiver.controller = "{DESIGNED}"'
         )
     if isinstance(controller, PidLoops):
         rates = rate_states(controller, terms.signals)
@@ -211,7 +238,7 @@ def _shape(rows: Sequence[Any]) -> list[Any]:
 
 
 def _coded(
-    config: FlightConfig, codec: Codec, terms: Terms, layout: Layout, given: Controller | None
+    config: FlightConfig, codec: Codec, terms: Terms, layout: Layout, parts: Parts
 ) -> tuple[CodedCommands, Description]:
     """Return the scheme for commands of any controller."""
     section, largest = config.downlink, terms.limits.command_max

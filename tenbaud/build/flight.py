@@ -107,7 +107,7 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
     try:
         codec = build_codec(config, parts)
         terms = checked_terms(config, codec, clock, parts.controller)
-        two_way, described = build_two_way(config, codec, terms, parts.controller)
+        two_way, described = build_two_way(config, codec, terms, parts)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     shared = config.shared_json(terms.lead_ticks, described)

@@ -32,8 +32,8 @@ class RoundTrip:
 def round_trip(terms: Terms, faults: LineFaults, clock: Clock) -> RoundTrip:
     """Return the round trip that terms and line allow."""
     delay_ns = faults.longest_delay_ns
-    if terms.downlink == "narrow":
-        heard_ns = terms.down_heard_ns + delay_ns
+    if terms.is_narrow:
+        heard_ns = terms.heard_ns + delay_ns
         return RoundTrip(_ticks(heard_ns - terms.downlink_budget_ns, terms), _ticks(heard_ns, terms))
     line_ns = terms.uplink_delivery_ns + terms.uplink_line_ns + terms.downlink_line_ns
     ideal = clock == "virtual" and terms.lead_ticks == 0 and terms.uplink_delivery_ns == 0

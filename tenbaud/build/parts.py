@@ -35,6 +35,8 @@ class Parts:
     coder: Coder | None = None
     plant: Plant | None = None
     controller: Controller | None = None
+    has_own_set_points: bool = True
+    """of a controller: false where it was built for the flight, with the configured ones"""
 
     def check(self) -> None:
         """Raise PartError for an object that lacks a required attribute of its part."""

@@ -7,6 +7,7 @@ Only `tenbaud.log` knows what files look like; here it is known what a flight ne
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from hashlib import blake2b
 from pathlib import Path
@@ -67,15 +68,26 @@ def flight_config(
     if _replays(values) and "timing.tick_s" not in given:
         _fit_tick(values.setdefault("timing", {}))
     config = checked(values, path, allow_code=allow_code)
+    written = path is not None and FlightConfig.model_fields.keys() <= read_toml(path).keys()
+    changed = given_names(None, overrides)
+    _warn_of_downlink(changed if written else given, config)
     if config.transmitter.rig != "replay":
-        return config.giving(_decided(given, path, config) | given_names(None, overrides))
+        return config.giving((_decided(given, config) | changed) if written else given)
     return _Adoption(values, path, given, config).config()
 
 
-def _decided(given: set[str], path: Path | None, config: FlightConfig) -> set[str]:
+def _warn_of_downlink(given: set[str], config: FlightConfig) -> None:
+    """Warn of settings of the narrow downlink that a person gave for another one."""
+    rung = config.channel.downlink
+    unused = [one for one in given if one == "channel.downlink_baud" or one.startswith("downlink.")]
+    if unused and rung != "narrow":
+        text = f'{", ".join(sorted(unused))}: without effect with channel.downlink = "{rung}"'
+        warnings.warn(f'{text}: set "narrow", or leave it out', UserWarning, stacklevel=3)
+
+
+def _decided(given: set[str], config: FlightConfig) -> set[str]:
     """Return the names that a person gave: a file that a flight wrote has every field of its preset."""
-    written = path is not None and FlightConfig.model_fields.keys() <= read_toml(path).keys()
-    if written and config.limits.command_max == load_config(config.preset).limits.command_max:
+    if config.limits.command_max == load_config(config.preset).limits.command_max:
         return given - {"limits.command_max"}
     return given
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from channel.codec.downlink.layout import symbols_carried
+from channel.codec.downlink.mirrored import MirroredLaw
 from channel.errors import LinkError, TenbaudError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
@@ -21,7 +22,7 @@ from channel.protocol.frames import Symbol
 from channel.protocol.terms import Rung
 from channel.protocol.wire import encode
 from tenbaud.build.codec import build_codec
-from tenbaud.build.flight import agree, build_terms
+from tenbaud.build.flight import Agreement, agree, build_terms
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.version import software_version
 from transmitter.rigs.serial_ports import list_ports
@@ -47,9 +48,11 @@ class Finding:
 
 def examine(config: FlightConfig, connect: tuple[str, ...] = ()) -> list[Finding]:
     """Look at everything; `connect` are Zenoh endpoints of a receiver to reach."""
+    agreement = agree(config, "real")
     return [
         *_software(),
-        *_numerics(config),
+        *_numerics(agreement),
+        *narrow_downlink(agreement),
         *_clock(config),
         *_ports(),
         serial_line(config),
@@ -84,16 +87,40 @@ def _software() -> list[Finding]:
     ]
 
 
-def _numerics(config: FlightConfig) -> list[Finding]:
-    identity = agree(config, "real").identity
+def _numerics(agreement: Agreement) -> list[Finding]:
     return [
         Finding(
             "ok",
             "numerics probe",
-            f"{identity.numerics_probe.hex()} with preset {config.preset}; the other machine must "
-            "show the same",
+            f"{agreement.identity.numerics_probe.hex()} with preset {agreement.config.preset}; the "
+            "other machine must show the same",
         )
     ]
+
+
+def narrow_downlink(agreement: Agreement) -> list[Finding]:
+    """Say what a narrow downlink carries, and how long that takes."""
+    if agreement.two_way is None:
+        return []
+    terms, scheme = agreement.terms, agreement.two_way.scheme
+    text = f"{terms.down_symbols} symbol(s) a sample; "
+    if not isinstance(scheme, MirroredLaw):
+        lead_s = terms.lead_ticks * terms.tick_ns / 1e9
+        text += f"commands come down, decided {lead_s:g} s ahead (timing.lead_ticks)"
+        return [Finding("ok", "narrow downlink", text)]
+    queue_s, word_s = (one * terms.sample_ns / 1e9 for one in (scheme.queue, scheme.queue_needed))
+    text += (
+        "only set-points come down, and the law runs beside the plant as well; a set-point by hand "
+        f"acts {queue_s:g} s after it is given, one of the configuration in time"
+    )
+    if len(scheme.ranges) == 1:
+        return [Finding("ok", "narrow downlink", text)]
+    text += (
+        f". {len(scheme.ranges)} outputs are steered, one word at a time: of set-points that change "
+        f"within {word_s:g} s, the second acts up to {word_s:g} s late, and so on; let them change one "
+        "after another, or shorten words (downlink.command_symbols with a higher channel.downlink_baud)"
+    )
+    return [Finding("note", "narrow downlink", text)]
 
 
 def _clock(config: FlightConfig) -> list[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -23,12 +24,15 @@ if TYPE_CHECKING:
 DEFAULT_PRESET = "tuned-10baud"
 DEFAULT_MISMATCH = 0.1
 """No model is exact."""
+OF_OUTPUT = ("out", "json", "verbose", "view", "view_port", "open_browser")
+"""Options that change nothing of what is flown."""
 VIEW_DURATION_S = 3600.0
 """A viewed flight lasts until it is stopped, or this long."""
 
 
 @spread
 def demo(
+    context: typer.Context,
     flight: options.FlightOptions,
     log: LogOptions,
     risk: MotorOptions,
@@ -70,7 +74,25 @@ def demo(
     from tenbaud.flight.demo import fly_demo
 
     fly = partial(fly_demo, draw=figure, view=view_options, pace=pace, compare=True)
-    raise typer.Exit(_fly_all(agreements, out, json, verbose, fly))
+    shown = len(agreements) == 1 and agreements[0].clock == "virtual" and not view
+    then = _on_the_page(context) if shown and not agreements[0].link.in_process else None
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, fly, then))
+
+
+def _on_the_page(context: typer.Context) -> str:
+    """Return the command that flies what this one flew, with the live page."""
+    words = []
+    for option in context.command.params:
+        source, name = context.get_parameter_source(option.name or ""), option.name or ""
+        if name in OF_OUTPUT or source is None or source.name != "COMMANDLINE":
+            continue
+        value = context.params[name]
+        for one in value if getattr(option, "multiple", False) else [value]:
+            if getattr(option, "is_flag", False):
+                words.append((option.opts if one else option.secondary_opts)[0])
+            else:
+                words += [option.opts[0], str(one)]
+    return shlex.join(["tenbaud", "demo", *words, "--view"])
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
@@ -91,15 +113,12 @@ def _view_options(
         return None
     from channel.links.endpoints import loopback_host
     from tenbaud.flight.viewing import ViewOptions
-    from tenbaud.view.server import Address, free_port, require_nicegui
+    from tenbaud.view.server import Address, require_nicegui
 
     if len(agreements) > 1 or agreements[0].link.in_process:
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
-    host = loopback_host()
-    address = Address(host, port or free_port(host))
-    address.check()
-    return ViewOptions(address.port, open_browser)
+    return ViewOptions(Address(loopback_host(), port).checked().port, open_browser)
 
 
 def _agree_all(
@@ -131,6 +150,7 @@ def _fly_all(
     as_json: bool,
     verbose: bool,
     fly: Callable[..., DemoResult],
+    then: str | None,
 ) -> int:
     from tenbaud.flight.display import StatusDisplay
     from tenbaud.flight.report import removed_as_not_begun, removed_unless_begun, show_summaries
@@ -159,5 +179,5 @@ def _fly_all(
         if result.code:
             break
     if results:
-        show_summaries([result.summary for result in results], folders, verbose=verbose)
+        show_summaries([result.summary for result in results], folders, verbose=verbose, then=then)
     return int(result.code)

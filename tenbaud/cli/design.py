@@ -73,20 +73,27 @@ def design(
     ],
     out: Annotated[Path, typer.Option(help="The completed configuration, for both ends.")],
     preset: options.Preset = None,
+    settings: options.Settings = None,
 ) -> None:
     """Complete a configuration: discretise its linear model, design its `direction` coder.
 
-    Run it once: give the same completed file to the transmitter and the receiver.
+    With the narrow downlink a state feedback that runs at both ends is designed too. Run it once: give
+    the same completed file to the transmitter and the receiver.
 
     [dim]tenbaud design --config plant.toml --out flight.toml[/dim]
+
+    [dim]tenbaud design --config plant.toml --out flight.toml --set channel.downlink=narrow[/dim]
     """
-    from tenbaud.config.load import checked, merged_values, read_toml, toml_text
+    from tenbaud.build.downlink import designed_law
+    from tenbaud.config.load import checked, merged, merged_values, read_toml, toml_text
     from tenbaud.design.complete import completed
     from tenbaud.files.whole import make_folder, write_whole
 
-    whole = completed(merged_values(preset, config))
-    checked(whole, config)
-    own = read_toml(config) | {name: whole[name] for name in ("model", "coder")}
+    changes = options.overrides(settings=settings)
+    whole = completed(merged_values(preset, config, changes))
+    own = merged(read_toml(config), changes) | {name: whole[name] for name in ("model", "coder")}
+    if law := designed_law(checked(whole, config)):
+        own["downlink"] = {**own.get("downlink", {}), "law": law}
     if preset is not None:
         own["preset"] = preset
     make_folder(out.parent)

@@ -184,6 +184,7 @@ def doctor(
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     connect: options.Connect = None,
+    settings: options.Settings = None,
     allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
@@ -194,11 +195,15 @@ def doctor(
     [dim]tenbaud doctor[/dim]
 
     [dim]tenbaud doctor --connect tcp/192.168.1.20:7447[/dim]
+
+    [dim]tenbaud doctor --preset tuned-10baud --set channel.downlink=narrow[/dim]
     """
     from tenbaud.checks.doctor import examine, report
     from tenbaud.config.load import load_config
 
-    findings = examine(load_config(preset, config, allow_code=allow_code), tuple(connect or ()))
+    changes = options.overrides(settings=settings)
+    flown = load_config(preset, config, changes, allow_code=allow_code)
+    findings = examine(flown, tuple(connect or ()))
     if json:
         options.print_json([asdict(finding) for finding in findings])
     else:

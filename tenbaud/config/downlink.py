@@ -15,6 +15,11 @@ PerSteered = Factor | tuple[Factor, ...] | dict[str, Factor] | None
 Share = Annotated[float, Field(ge=1e-6, le=100.0)]
 """Of the largest value that the limits of the inputs let through."""
 ANNOUNCE_S_MAX = 60.0
+OF_SCHEME = {
+    "mirrored": ("bits", "announce_s", "set_point_min", "set_point_max", "law"),
+    "coded": ("directions", "turns", "feedback", "range_min", "range_max", "value_max"),
+}
+"""Fields that change nothing with the other scheme."""
 
 
 class StateLawSection(Section):
@@ -36,7 +41,7 @@ class StateLawSection(Section):
 
 
 class DownlinkSection(Section):
-    """What the symbols of the narrow downlink say; shared, and ignored on the other downlinks."""
+    """What the symbols of the narrow downlink say; shared, without effect on other downlinks."""
 
     scheme: Literal["auto", "mirrored", "coded"] = "auto"
     """mirrored: the law runs at both ends, beside the plant as well, and only set-points go down;

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from channel.codec.codec import Coder, Model
 from channel.errors import TenbaudError
-from channel.links.endpoints import loopback_host
 from channel.protocol.terms import Clock, Rung
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
+from tenbaud.build.codec import build_model
 from tenbaud.build.controllers import controller_context
 from tenbaud.build.ends import check_parts, check_rig, check_sabotage
 from tenbaud.build.flight import Agreement, agree
@@ -156,10 +156,10 @@ def _looks(agreement: Agreement, show: bool, pace: float | None) -> dict[str, An
         return {"drawing": NotebookDrawing(agreement), "pace": pace}
     if not show:
         return {"pace": pace}
-    from tenbaud.view.server import free_port, require_nicegui
+    from tenbaud.view.server import require_nicegui
 
     require_nicegui()
-    view = ViewOptions(free_port(loopback_host()), open_browser=True)
+    view = ViewOptions(0, open_browser=True)
     return {"view": view, "pace": pace or (1.0 if agreement.clock == "virtual" else None)}
 
 
@@ -256,19 +256,22 @@ def _agreement(
     loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any], accept_risk: bool
 ) -> Agreement:
     """Return what both ends share, with every part built and checked."""
-    agreement = agree(loaded, clock, _objects(parts))
     plant, controller = parts.get("plant"), parts.get("controller")
+    objects = _objects(parts)
+    if inspect.isclass(controller):
+        try:
+            asked = controller_context(loaded, build_model(loaded, objects))
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+        built = build_class("the controller", controller, asked, {}, Controller)
+        objects = replace(objects, controller=built, has_own_set_points=False)
+    agreement = agree(loaded, clock, objects)
     made = agreement.parts
     context = plant_context(loaded, loaded.timing.tick_s, agreement.signals)
     if is_system(plant):
         made = replace(made, plant=system_plant(plant, context))
     elif inspect.isclass(plant):
         made = replace(made, plant=build_class("the plant", plant, context, {}, Plant))
-    if inspect.isclass(controller):
-        asked = controller_context(loaded, agreement.codec.model)
-        made = replace(
-            made, controller=build_class("the controller", controller, asked, {}, Controller)
-        )
     agreement = replace(agreement, parts=made)
     check_parts(loaded, made)
     check_sabotage(agreement)

@@ -206,7 +206,7 @@ def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
 
 def _check_two_way(terms: Terms, two_way: TwoWay | None) -> None:
     """Raise ValueError for a state machine that is not that of the terms' downlink."""
-    if (terms.downlink == "narrow") is not (two_way is not None):
+    if terms.is_narrow is not (two_way is not None):
         raise ValueError(
             f"terms.downlink is {terms.downlink!r} and two_way is {two_way}; the narrow downlink needs "
             "one, and no other downlink has one"

@@ -91,10 +91,13 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
 
 def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> None:
     """Draw the figure of a run from its recordings. Raises RecordingError and WriteError."""
-    from tenbaud.recording.figure import draw_flight
+    from tenbaud.recording.figure import FLIGHT_DOTS_PER_INCH, draw_run
+    from tenbaud.recording.style import save
 
     receiver = folder.receiver if folder.receiver.is_file() else None
-    draw_flight(folder.transmitter, receiver, folder.figure, title, usual)
+    # Its recordings were made just now.
+    figure = draw_run(folder.transmitter, receiver, title, own=True, usual=usual)
+    save(figure, [folder.figure], FLIGHT_DOTS_PER_INCH)
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:
@@ -103,9 +106,16 @@ def figure_title(config: FlightConfig, summary: Summary) -> str:
 
 
 def show_summaries(
-    summaries: Sequence[Summary], folders: Sequence[RunFolder], *, verbose: bool = False
+    summaries: Sequence[Summary],
+    folders: Sequence[RunFolder],
+    *,
+    verbose: bool = False,
+    then: str | None = None,
 ) -> None:
-    """Print how flights ended; with `verbose` also every figure, the flights side by side."""
+    """Print how flights ended; with `verbose` also every figure, the flights side by side.
+
+    `then` is as for `closing_lines`.
+    """
     from rich.console import Console
 
     from tenbaud.flight.closing import closing_lines
@@ -116,7 +126,7 @@ def show_summaries(
     if verbose:
         console.print(_table(summaries))
     for summary, folder in zip(summaries, folders, strict=True):
-        lines = closing_lines(summary, folder, unicode=unicode_fits(console))
+        lines = closing_lines(summary, folder, unicode=unicode_fits(console), then=then)
         text = for_terminal("\n".join(lines))
         console.print(text, soft_wrap=True, highlight=False, markup=False)
 

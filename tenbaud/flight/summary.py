@@ -112,7 +112,7 @@ def _rate(run: TransmitterRun) -> Summary:
     if not run.ticks:
         return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
     samples = run.ticks / terms.ticks_per_sample
-    if terms.downlink == "narrow":
+    if terms.is_narrow:
         # Whether the last words were consumed was not certain yet.
         samples = max(1, counts["confirmed"])
     share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)

@@ -112,7 +112,7 @@ def settings_of(agreement: Agreement) -> Settings:
         deadline_allowance_s=terms.deadline_allowance_ns / 1e9,
         uplink_spread_s=2 * up.jitter_ns / 1e9,
         repeats=terms.repeats,
-        is_narrow=terms.downlink == "narrow",
+        is_narrow=terms.is_narrow,
         is_mirrored=terms.is_mirrored,
     )
 

@@ -161,8 +161,8 @@ def _rate(one: Fields) -> str:
         f"the symbol rate is too low: {one['limit']:g} symbols/s are configured, "
         f"{one['value']:.0f} arrive in time, {1.0 - one['value'] / one['limit']:.1%} of the symbols "
         f"are late or were never sent. This process missed {one['missed_share']:.1%} of its ticks; in "
-        f"{one['overdue_share']:.1%} of the others echoes were overdue. Lower channel.rate_baud, or "
-        "give both processes more processor time"
+        f"{one['overdue_share']:.1%} of the others the receiver's answers were overdue. Lower "
+        "channel.rate_baud, or give both processes more processor time"
     )
 
 

@@ -110,7 +110,7 @@ def figures_of(summary: Summary, unicode: bool = True) -> Iterator[tuple[str, st
     if get("downlink", "full") != "full":
         yield "Downlink", f"{get('downlink')}: {_bits(summary, 'down')}{_scheme(summary)}"
     if (narrow := get("narrow") or {}).get("samples_confirmed"):
-        yield "Lockstep", _lockstep(narrow)
+        yield "Lockstep", lockstep_text(narrow)
     yield from _errors(summary, unicode)
     if learned := summary.get("learned"):
         seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
@@ -184,7 +184,8 @@ def _scheme(summary: Summary) -> str:
     return "; commands, coded" if scheme else ""
 
 
-def _lockstep(narrow: Summary) -> str:
+def lockstep_text(narrow: Summary) -> str:
+    """Return how soon samples were certain, and how long a difference stays unseen."""
     return (
         f"certain after {narrow['confirmed_after_median']} samples (median), "
         f"{narrow['confirmed_after_max']} at most; a difference stays unseen for n samples with "

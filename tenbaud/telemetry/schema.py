@@ -58,7 +58,7 @@ class Decision(_Message):
 
 
 class SentSample(_Message):
-    """One sample that the receiver's echo has confirmed."""
+    """One sample whose word, as the receiver consumed it, the transmitter knows."""
 
     sample: int = Field(description="index of the sample")
     word_sent: list[int] | None = Field(description="symbols sent; null: none")

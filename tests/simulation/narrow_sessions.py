@@ -92,7 +92,7 @@ class DownLine(CleanLine):
         frame = decode(data)
         if not isinstance(frame, DownSymbol):
             return [Delivery(now_ns, data)]
-        slot_ns = max(now_ns, self._terms.down_slot_ns(frame.slot))
+        slot_ns = max(now_ns, self._terms.down_grid.slot_ns(frame.slot))
         came = self._line.carry(frame.number, (0, 1))
         if came is None:
             return [Delivery(slot_ns, None)]
@@ -179,4 +179,4 @@ class TimedFlight(NarrowFlight):
         self._arriving.append((self.sample, heard))
         for slot, one in enumerate(heard, self.sample * len(heard)):
             if self._live_tick is None and one is not None:
-                self._live_tick = -(-self._terms.down_slot_ns(slot) // 10_000_000)
+                self._live_tick = -(-self._terms.down_grid.slot_ns(slot) // 10_000_000)

@@ -45,7 +45,7 @@ def test_when_sessions_fly_then_all_bits_are_those_of_the_flight_without(
     machine, queue = SCHEMES[name]
     flight_terms = narrow_terms(machine, is_mirrored=queue is not None)
     wanted = pid() if queue is None else announced(queue)
-    twin = TimedFlight(machine, wanted, 3, faults, flight_terms.down_heard_ns)
+    twin = TimedFlight(machine, wanted, 3, faults, flight_terms.heard_ns)
     twin.fly(SAMPLES)
     flight = memory_flight(machine, controller_of(queue), 3, faults)
     result = flight.fly(SAMPLES * 0.1)

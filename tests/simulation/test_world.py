@@ -15,7 +15,7 @@ from tests.simulation.world import World
 from transmitter.session.owing import Owing
 from transmitter.session.session import TransmitterSession
 
-SEEDS = 14
+SEEDS = 6
 MORE_SEEDS = 24
 """`make soak` flies these too, and random ones."""
 

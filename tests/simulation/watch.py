@@ -186,7 +186,7 @@ class Watch:
         session, other = world.node.session, world.endpoint.session
         trip_ns = world.plan.round_trip_ns
         if self.terms.downlink == "narrow":
-            trip_ns += self.terms.down_heard_ns
+            trip_ns += self.terms.heard_ns
         trip = -(-trip_ns // self.terms.sample_ns)
         together = (session.session_number, session.epoch) == (other.session_number, other.epoch)
         flown = session.confirmed_state.sample * self.terms.ticks_per_sample > session.epoch_tick

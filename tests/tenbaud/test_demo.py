@@ -61,13 +61,22 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
 
 
 def test_when_a_person_runs_it_then_one_flight_is_shown_beside_the_usual_loop(tmp_path: Path) -> None:
-    ended = run("demo", "--duration", "30", cwd=tmp_path)
+    given = ["--set", "coder.window_signs=3", "--duration", "30s"]
+    ended = run("demo", *given, "--set", "coder.decay=0.9", "--mismatch", "10%", cwd=tmp_path)
     assert ended.code == 0, ended.err
     assert ended.out.startswith("✓ Flight finished: 30 s, both codecs equal in 300 of 300 checks")
     assert "digest_checks" not in ended.out, "that is for --verbose"
     assert "pitch off the model by +10%; tuned-10baud over zenoh" in ended.out
     assert "° over 1000 bit/s), " in ended.out
     assert len(list((tmp_path / "runs").iterdir())) == 1
+    again = ended.out.partition("Next: ")[2].split()
+    assert again[:2] + again[-1:] == ["tenbaud", "demo", "--view"]
+    fields = [one for one in again if "=" in one]
+    assert fields == ["coder.window_signs=3", "coder.decay=0.9"]
+    assert {again[at + 1] for at, one in enumerate(again) if one in ("--duration", "--mismatch")} == {
+        "30.0",
+        "0.1",
+    }
 
 
 def test_the_usual_loop_beside_a_flight_is_the_one_that_both_sessions_fly() -> None:

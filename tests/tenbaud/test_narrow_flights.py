@@ -70,8 +70,7 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
     meter = flown.receiver.downlink.meter
     assert meter.wire_bytes == meter.symbols + meter.control_bytes >= carried
     assert meter.coder_bits == meter.symbols
-    held_up = flown.receiver.downlink.refused or flown.receiver.session.counts["erasures"] > 5
-    if held_up or flown.transmitter.node.session.counts["words_missed"]:
+    if flown.receiver.downlink.refused or flown.transmitter.node.session.counts["words_missed"]:
         pytest.skip("the machine was too busy for the symbols' times")
     assert flown.outcome.code is ExitCode.OK, flown.outcome.text
     check_equal_where_confirmed(flown)

@@ -144,8 +144,6 @@ def test_when_the_line_has_2400_baud_then_the_compact_downlink_flies_over_it(tmp
         flown = fly(line, {**settings(line_rate_baud=2400), "channel": {"downlink": "compact"}})
         carried = line.carried("down")
     flown.assert_nothing_silent()
-    if flown.receiver.session.counts["erasures"] > 5:
-        pytest.skip("the machine was too busy for the symbols' times")
     assert flown.outcome.code is ExitCode.OK, flown.outcome.text
     downlink = flown.receiver.downlink
     samples = flown.receiver.session.counts["samples"]

@@ -29,6 +29,8 @@ LEAD_IN_NS = 20_000_000
 """Between the handshake and tick 0."""
 LAST_ECHO_NS = 1_000_000_000
 """How much later than agreed the last echo may come, when no other can make up for it."""
+OLD_ANSWERS_MAX = 5
+"""Answers that are too old to begin on before the flight begins on one all the same."""
 CATCH_UP_MESSAGES_MAX = 64
 """Messages taken in a row by a loop that is behind its ticks."""
 
@@ -79,6 +81,11 @@ class RealFlight(Flight):
         self._start_ns = time.monotonic_ns()
         self._asked_ns: int | None = None
         """when a session was asked for first"""
+        self._hello = (0, b"")
+        """when the last request left, and its message"""
+        self._welcome = b""
+        self._is_answered = self._has_begun = False
+        self._old_answers = 0
         self._peer_told = True
         """presence of the receiver as last reported"""
         terms = endpoint.node.session.terms
@@ -102,13 +109,36 @@ class RealFlight(Flight):
 
     def _await_answer(self) -> None:
         until_ns = self._now_ns() + self._ask_again_ns
-        while self.endpoint.greeting and (left_ns := until_ns - self._now_ns()) > 0:
+        self._is_answered = False
+        while not self._is_answered and (left_ns := until_ns - self._now_ns()) > 0:
             self._take_in(left_ns / 1e9)
         self._send_due()
 
+    def _needs_answer(self) -> bool:
+        """Return whether there is no answer, or one so old that the receiver expects symbols by now."""
+        if self.endpoint.greeting:
+            return True
+        flying = self.endpoint.node.session.phase is Phase.FLYING
+        too_old = flying and (not self._is_answered or self._now_ns() > self._latest_start_ns)
+        self._old_answers += too_old
+        return too_old and self._old_answers <= OLD_ANSWERS_MAX
+
+    @property
+    def _latest_start_ns(self) -> int:
+        """Return when the flight has to begin at the latest, on a line that brings no whole slots."""
+        within_ns, terms = self._link.start_ns, self.endpoint.node.session.terms
+        if within_ns is None:
+            return sys.maxsize
+        left_ns, hello = self._hello
+        size = self._link.wire.size
+        lines_ns = size(hello) * terms.uplink_line_ns + size(self._welcome) * terms.downlink_byte_ns
+        return left_ns + lines_ns + within_ns
+
     def _begin(self) -> None:
-        first_ns = self.endpoint.tick * self._tick_ns
-        self._start_ns = time.monotonic_ns() + LEAD_IN_NS - first_ns
+        # A process that is held up here misses its first ticks: the receiver counts from its answer.
+        begins_ns = min(self._now_ns() + LEAD_IN_NS, self._latest_start_ns)
+        self._has_begun = True
+        self._start_ns += begins_ns - self.endpoint.tick * self._tick_ns
 
     def _rest(self) -> None:
         endpoint = self.endpoint
@@ -179,7 +209,11 @@ class RealFlight(Flight):
                 "the receiver flies on the virtual clock, this end on the real one; give both the "
                 "same --clock"
             )
+        if self.endpoint.greeting:
+            self._welcome = data
         self._outbox.put(self.endpoint.take(data, self._now_ns()))
+        # Another answer to the same request is the same message.
+        self._is_answered = not self.endpoint.greeting and data == self._welcome
         return True
 
     def _send(self, messages: list[Delivery]) -> None:
@@ -188,7 +222,13 @@ class RealFlight(Flight):
 
     def _send_due(self) -> None:
         for message in self._outbox.take(self._now_ns()):
+            if self._has_begun:
+                self._link.send(message)
+                continue
+            leaves_ns, before = self._now_ns(), self._link.counts.messages_out
             self._link.send(message)
+            if self._link.counts.messages_out > before:
+                self._hello = leaves_ns, message
 
     def _send_past_line(self, message: bytes) -> None:
         self._link.send(message)

@@ -30,7 +30,7 @@ CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
 
 
 class Confirmed(NamedTuple):
-    """One sample that the receiver's echo has confirmed."""
+    """One sample whose word, as the receiver consumed it, is known."""
 
     sample: int
     before: CodecState
@@ -47,7 +47,7 @@ class Confirmed(NamedTuple):
     peer_mask: int
     """which of its bits the receiver sent; the others are taken from ours"""
     lag_samples: int
-    """samples that had been sent beyond this one when its echo came"""
+    """samples beyond this one when it was confirmed: sent, or on the narrow downlink heard of"""
     about: tuple[int, ...] | None = None
     """the output that each symbol codes, set by `Copies.explained`"""
 

@@ -68,7 +68,7 @@ class NarrowFollowing:
         self._age_max = -(-AGE_UNKNOWN_SYMBOLS // parts.terms.down_symbols)
         terms = parts.terms
         slots_ns = SILENT_SLOTS * terms.sample_ns // terms.down_symbols
-        silent_ns = slots_ns + terms.down_heard_ns + line_delay_ns
+        silent_ns = slots_ns + terms.heard_ns + line_delay_ns
         self._silent_ticks_max = -(-silent_ns // terms.tick_ns)
         self._came_tick: int | None = None
         """of the last down symbol, or of the epoch's beginning; None: none has come in this flight"""
@@ -218,11 +218,9 @@ class NarrowFollowing:
         self.certainty.on_heard(listed.size)
         if listed.rejoin is None:
             return None
-        why, _, rest, lag, detail = listed.rejoin
-        if why is Why.REST:
+        if listed.rejoin.why is Why.REST:
             self._write_assumed()
-        asked = replace(ASKED, sample=listed.next_confirmed, number=lag, value=rest, detail=detail)
-        return Lost(why, asked)
+        return Lost(*listed.rejoin)
 
     def _write_assumed(self) -> None:
         """Record the samples that are not certain: the first one that differs may be among them."""

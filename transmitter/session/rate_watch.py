@@ -17,9 +17,9 @@ KEPT_SHARE = 0.95
 OWN_SHARE = 0.01
 """Share of ticks missed by this process above which it has part in that."""
 SLOW_SHARE = 0.5
-"""Share of ticks with echoes overdue above which the way to the receiver and back has part in it."""
+"""Share of ticks with answers overdue above which the way to the receiver and back has part in it."""
 SLOW_NS = 20_000_000
-"""Echoes that lag by this and by twice the command lead are overdue."""
+"""Answers, echoes or down symbols, that lag by this and by twice the command lead are overdue."""
 
 
 class RateWatch:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from channel.codec.codec import Codec
-from channel.protocol.recording import Field, RecordChannel, Recorder
+from channel.protocol.recording import AFTER_SAMPLE, WORD, Field, RecordChannel, Recorder
 from channel.protocol.terms import Terms
 from transmitter.session.copies import Confirmed
 
@@ -48,18 +48,15 @@ SAMPLE_CHANNEL = RecordChannel(
     (
         Field("sample", "integer", "", "index of the sample"),
         Field("word_sent", "integers", "", "symbols sent; null: none"),
-        Field("word", "integers", "", "symbols as the receiver consumed them; null: erased"),
-        Field("range", "numbers", "", "range M of each output before the word"),
-        Field("state", "numbers", "", "codec's model state after the sample"),
-        Field("coder", "numbers", "", "coder state after the sample"),
-        Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
+        WORD,
+        *AFTER_SAMPLE,
         Field(
             "peer_digest",
             "string",
             "",
             "the receiver's digest of it: the last digits that were sent",
         ),
-        Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
+        Field("lag_samples", "integer", "", "samples beyond it when it was confirmed", timing=True),
         Field("about", "integers", "", "output that each symbol was about, from 0; null: erased"),
     ),
 )
@@ -68,7 +65,7 @@ CONFIRMED_CHANNEL = RecordChannel(
     "confirmed",
     (
         Field("sample", "integer", "", "index of the sample"),
-        Field("word", "integers", "", "symbols as the receiver consumed them; null: erased"),
+        WORD,
         Field("symbols", "integers", "", "its down symbols as the receiver sent them"),
         Field("commands", "numbers", "", "commands of its ticks, all inputs of a tick together"),
         Field("doubt", "number", "", "share of other inputs that led to the same state"),

@@ -36,7 +36,7 @@ from channel.protocol.frames import (
     Why,
 )
 from channel.protocol.identity import Identity, differing_fields
-from channel.protocol.lockstep import History, difference_event, is_answer, write_failure
+from channel.protocol.lockstep import difference_event, is_answer, write_failure
 from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
@@ -189,10 +189,6 @@ class TransmitterSession:
         """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
         return self.following.command(tick)
 
-    def take_confirmed(self) -> list[Confirmed]:
-        """Record and return the samples confirmed since the last call; the next symbol goes first."""
-        return self.following.take_confirmed()
-
     # What arrives
 
     def on_frame(self, frame: Frame) -> list[Frame]:
@@ -214,7 +210,9 @@ class TransmitterSession:
                 return self._on_claim(frame)
             case Desync() if not self._report_answered and is_answer(frame, self.desync):
                 self._report_answered = True
-                write_failure(self._recorder, self.terms.sample_ns, self.history, frame, frame.state)
+                write_failure(
+                    self._recorder, self.terms.sample_ns, self.following.history, frame, frame.state
+                )
             case Refuse() if frame.incarnation == self.incarnation:
                 return self._on_refuse(frame)
             case Bye() if self._has_session and frame.session == self.session_number:
@@ -321,7 +319,7 @@ class TransmitterSession:
         digests = (done.digest, done.peer_digest)
         self.desync = Desync(self.session_number, self.epoch, done.sample, *digests, state)
         self._emit(difference_event(self.desync))
-        write_failure(self._recorder, self.terms.sample_ns, self.history, self.desync, b"")
+        write_failure(self._recorder, self.terms.sample_ns, self.following.history, self.desync, b"")
         if self._stop_on_desync:
             return [self.desync, *self.bye(End(Ending.DESYNC))]
         return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))
@@ -358,11 +356,6 @@ class TransmitterSession:
     def lag_samples(self) -> int:
         """Return how many samples were sent of which nothing has been heard."""
         return self.following.lag_samples
-
-    @property
-    def history(self) -> History:
-        """Return the last confirmed states, for a failure to be looked into."""
-        return self.following.history
 
     @property
     def reliable_state(self) -> Vector | None:

@@ -12,7 +12,6 @@ what the adaptive rule (19) is for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from channel.codec.codec import STATE_MAX, Vector
@@ -20,8 +19,7 @@ from channel.codec.coders.base import CoderFunctions, Numbers, Results, Symbols
 from channel.codec.coders.signs import Gains, SignCoder, encode_signs, spread_signs
 
 
-@dataclass(frozen=True, slots=True)
-class OpenLoopZoomParameters:
+class OpenLoopZoomParameters(NamedTuple):
     """Constants of the range and the observer gains."""
 
     initial_range: float = 0.5
@@ -35,17 +33,8 @@ class OpenLoopZoomParameters:
     impulse: bool = False
 
 
-class OpenLoopZoomConstants(NamedTuple):
-    """Constants of the functions below."""
-
-    decay: float
-    floor: float
-    """(1 - rho) M_min"""
-    gains: Gains
-
-
 def open_loop_zoom_decode(
-    constants: OpenLoopZoomConstants,
+    constants: OpenLoopZoomParameters,
     coder: Numbers,
     model: Numbers,
     symbols: Symbols,
@@ -56,19 +45,18 @@ def open_loop_zoom_decode(
     """Write the correction (21),(23) and the ranges of the next sample."""
     spread_signs(constants.gains, coder, symbols, correction)
     for axis in range(len(symbols)):
-        after[axis] = constants.floor + constants.decay * coder[axis]
+        floor = (1.0 - constants.decay) * constants.minimum_range
+        after[axis] = floor + constants.decay * coder[axis]
 
 
 class OpenLoopZoomCoder(SignCoder):
     """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
 
     functions = CoderFunctions(encode_signs, open_loop_zoom_decode)
+    parameters: OpenLoopZoomParameters
 
     def __init__(self, parameters: OpenLoopZoomParameters) -> None:
-        super().__init__(parameters.gains, parameters.decay, parameters.impulse)
-        self.parameters = parameters
-        floor = (1.0 - parameters.decay) * parameters.minimum_range
-        self.constants = OpenLoopZoomConstants(parameters.decay, floor, parameters.gains)
+        super().__init__(parameters)
 
     def initial(self) -> Vector:
         return (self.parameters.initial_range,) * self.axes

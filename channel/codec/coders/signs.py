@@ -36,15 +36,19 @@ def spread_signs(gains: Gains, ranges: Numbers, signs: Symbols, correction: Resu
 
 
 class SignCoder(FunctionCoder):
-    """A sign per measured axis, and a range for each, which come first in the coder state."""
+    """A sign per measured axis, and a range for each, which come first in the coder state.
 
-    def __init__(self, gains: Gains, decay: float, impulse: bool) -> None:
-        self.axes = axes_of(gains)
-        if not 0.0 < decay <= 1.0:
-            raise ValueError(f"decay must be in (0, 1], got {decay}")
-        self.impulse = impulse
+    The functions take the parameters as they are: `gains`, `decay`, `impulse` and others.
+    """
+
+    def __init__(self, parameters: Any) -> None:
+        self.axes = axes_of(parameters.gains)
+        if not 0.0 < parameters.decay <= 1.0:
+            raise ValueError(f"decay must be in (0, 1], got {parameters.decay}")
+        self.parameters = self.constants = parameters
+        self.impulse = parameters.impulse
         self.alphabet = Alphabet((-1, 1), self.axes)
-        self.correction_size = len(gains)
+        self.correction_size = len(parameters.gains)
 
     def ranges(self, coder: Vector) -> Vector:
         return coder[: self.axes]

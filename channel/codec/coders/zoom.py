@@ -11,7 +11,6 @@ An erased word corrects nothing and enters the window as a zero.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from channel.codec.codec import STATE_MAX, Vector
@@ -19,8 +18,7 @@ from channel.codec.coders.base import CoderFunctions, Numbers, Results, Symbols
 from channel.codec.coders.signs import Gains, SignCoder, encode_signs, spread_signs
 
 
-@dataclass(frozen=True, slots=True)
-class ZoomParameters:
+class ZoomParameters(NamedTuple):
     """Constants of (19) and the observer gains. Defaults are the paper's."""
 
     initial_range: float = 0.5
@@ -37,18 +35,8 @@ class ZoomParameters:
     """False: the correction is held over the sample as in (22); True: applied to the state at once"""
 
 
-class ZoomConstants(NamedTuple):
-    """Constants of the functions below."""
-
-    window: int
-    decay: float
-    floor: float
-    """(1 - rho) M_min"""
-    gains: Gains
-
-
 def zoom_decode(
-    constants: ZoomConstants,
+    constants: ZoomParameters,
     coder: Numbers,
     model: Numbers,
     symbols: Symbols,
@@ -73,7 +61,7 @@ def zoom_decode(
         saturated = 2.0 * total > constants.window or 2.0 * total < -constants.window
         decay = constants.decay
         scaled = coder[axis] / decay if saturated else decay * coder[axis]
-        after[axis] = constants.floor + scaled
+        after[axis] = (1.0 - decay) * constants.minimum_range + scaled
 
 
 class ZoomCoder(SignCoder):
@@ -83,18 +71,12 @@ class ZoomCoder(SignCoder):
     """
 
     functions = CoderFunctions(encode_signs, zoom_decode)
+    parameters: ZoomParameters
 
     def __init__(self, parameters: ZoomParameters) -> None:
-        super().__init__(parameters.gains, parameters.decay, parameters.impulse)
+        super().__init__(parameters)
         if parameters.window < 1:
             raise ValueError(f"window must be at least 1 sign, got {parameters.window}")
-        self.parameters = parameters
-        self.constants = ZoomConstants(
-            parameters.window,
-            parameters.decay,
-            (1.0 - parameters.decay) * parameters.minimum_range,
-            parameters.gains,
-        )
 
     def initial(self) -> Vector:
         """Return `M_0` for every axis and an empty (zero) sign history."""

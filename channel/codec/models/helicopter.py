@@ -17,6 +17,7 @@ import math
 from typing import NamedTuple
 
 from channel.codec.codec import Vector
+from channel.codec.models.base import FunctionModel
 from channel.codec.numerics import cos, exp, sin
 from channel.codec.signals import InputSignal, Signal, Signals
 
@@ -176,7 +177,7 @@ def helicopter_tick(
     )
 
 
-class HelicopterModel:
+class HelicopterModel(FunctionModel):
     """Three angles and two rotors."""
 
     state_size = 8
@@ -202,18 +203,6 @@ class HelicopterModel:
         left_half = exp(-0.5 * tick_s / motor_lag_s) if motor_lag_s > 0.0 else 0.0
         left_whole = exp(-tick_s / motor_lag_s) if motor_lag_s > 0.0 else 0.0
         self.constants = HelicopterConstants(parameters, tick_s, left_half, left_whole)
-
-    def initial(self) -> Vector:
-        """Return the state that both ends begin with."""
-        return self._start
-
-    def measured(self, state: Vector) -> Vector:
-        """Return travel, elevation and pitch."""
-        return state[:3]
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `helicopter_tick`."""
-        return helicopter_tick(state, command, held, self.constants)
 
 
 def hover_volts(parameters: HelicopterParameters, elevation_rad: float) -> float:

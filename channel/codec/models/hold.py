@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from channel.codec.codec import Vector
+from channel.codec.models.base import FunctionModel, RowModel
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.codec.signals import Signal, Signals
 
@@ -14,7 +15,7 @@ def hold_row(state: Vector, command: Vector, held: Vector, constants: Vector, ro
     return state[row] + constants[0] * held[row]
 
 
-class HoldModel:
+class HoldModel(RowModel, FunctionModel):
     """Angles in rad, then their rates, held between words; two motor voltages that it does not read."""
 
     input_size = 2
@@ -28,17 +29,3 @@ class HoldModel:
         self.state_size = self.correction_size = 2 * len(outputs)
         self.constants: Vector = (tick_s,)
         self._start = start or (0.0,) * self.state_size
-
-    def initial(self) -> Vector:
-        """Return the state that both ends begin with."""
-        return self._start
-
-    def measured(self, state: Vector) -> Vector:
-        """Return the angles."""
-        return state[: len(self.signals.outputs)]
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `hold_row`."""
-        return tuple(
-            [hold_row(state, command, held, self.constants, row) for row in range(self.state_size)]
-        )

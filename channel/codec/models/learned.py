@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from channel.codec.codec import Model, Vector
+from channel.codec.models.base import RowModel
 from channel.codec.models.linear import LinearModel, linear_output
 from channel.codec.signals import Signal, Signals, signals_of
 
@@ -113,7 +114,7 @@ def plant_model(model: Model) -> Any:
     return model.plant if isinstance(model, LearnedModel) else model
 
 
-class LearnedLinearModel(LearnedModel):
+class LearnedLinearModel(RowModel, LearnedModel):
     """A linear model of which entries of A and B may be off, and on which a constant force may act.
 
     `dynamics` and `drive` are A and B. Rows that only say that a state is the rate of another are not
@@ -161,12 +162,6 @@ class LearnedLinearModel(LearnedModel):
             places,
             rows,
             freshness,
-        )
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        constants = self.constants
-        return tuple(
-            [learned_row(state, command, held, constants, row) for row in range(self.state_size)]
         )
 
 

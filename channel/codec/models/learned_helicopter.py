@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from channel.codec.codec import Vector
+from channel.codec.models.base import FunctionModel
 from channel.codec.models.helicopter import (
     HelicopterConstants,
     HelicopterModel,
@@ -84,7 +85,7 @@ def learned_helicopter_tick(
     return helicopter_tick(state[:8], command, pushed, constants.plant) + state[8:19] + means
 
 
-class LearnedHelicopterModel(LearnedModel):
+class LearnedHelicopterModel(LearnedModel, FunctionModel):
     """Three angles, two rotors, and the errors of eight terms and three forces."""
 
     tick_function = staticmethod(learned_helicopter_tick)
@@ -92,6 +93,3 @@ class LearnedHelicopterModel(LearnedModel):
     def __init__(self, plant: HelicopterModel, freshness: float) -> None:
         super().__init__(plant, tuple(TERMS), tuple(TERMS.values()))
         self.constants = LearnedHelicopterConstants(plant.constants, freshness)
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        return learned_helicopter_tick(state, command, held, self.constants)

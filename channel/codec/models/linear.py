@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from channel.codec.codec import Vector
+from channel.codec.models.base import RowModel
 from channel.codec.signals import Signals
 
 Rows = Sequence[Sequence[float]]
@@ -59,7 +60,7 @@ def linear_output(state: Vector, constants: LinearConstants, place: int) -> floa
     return total
 
 
-class LinearModel:
+class LinearModel(RowModel):
     """Prediction model `x <- F x + E u` with the outputs `C x`.
 
     All states take corrections, or the first `corrected` of them. `start` is the state that both ends
@@ -114,12 +115,6 @@ class LinearModel:
     def measured(self, state: Vector) -> Vector:
         constants = self.constants
         return tuple([linear_output(state, constants, place) for place in range(len(self.outputs))])
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        constants = self.constants
-        return tuple(
-            [linear_row(state, command, held, constants, row) for row in range(self.state_size)]
-        )
 
 
 def flat(rows: Rows) -> Vector:

@@ -10,6 +10,7 @@ lambda / ln 2 bits a second can hold it: 10.56 for the 7.32 1/s of Khojasteh et 
 from __future__ import annotations
 
 from channel.codec.codec import ModelContext, Vector
+from channel.codec.models.base import FunctionModel
 from channel.codec.numerics import sin
 from channel.codec.signals import InputSignal, Signal, Signals
 
@@ -46,7 +47,7 @@ def pendulum_tick(state: Vector, command: Vector, held: Vector, constants: Vecto
     )
 
 
-class PendulumModel:
+class PendulumModel(FunctionModel):
     """An inverted pendulum, upright at angle 0, pushed by one motor."""
 
     state_size = 2
@@ -67,15 +68,3 @@ class PendulumModel:
         growth = growth_per_s * growth_per_s
         self.constants: Vector = (growth, damping_per_s, torque_gain_rad_per_v_s2, context.tick_s)
         self._start = start or (0.0, 0.0)
-
-    def initial(self) -> Vector:
-        """Return the state that both ends begin with."""
-        return self._start
-
-    def measured(self, state: Vector) -> Vector:
-        """Return the angle, the one output."""
-        return state[:1]
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `pendulum_tick`."""
-        return pendulum_tick(state, command, held, self.constants)

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from channel.codec.codec import Vector
+from channel.codec.models.base import FunctionModel
 from channel.codec.numerics import exp, sin
 from channel.codec.signals import InputSignal, Signal, Signals
 
@@ -97,7 +98,7 @@ def pitch_tick(state: Vector, command: Vector, held: Vector, constants: Vector) 
     )
 
 
-class PitchModel:
+class PitchModel(FunctionModel):
     """Prediction model of the pitch: states (angle rad, rate rad/s, two lagging voltages V)."""
 
     state_size = 4
@@ -109,17 +110,5 @@ class PitchModel:
     def __init__(self, parameters: PitchParameters, tick_s: float, start: Vector = ()) -> None:
         """`start` is the initial state; empty: the paper's, at angle zero, at rest, motors off."""
         self.parameters = parameters
-        self.constants = pitch_constants(parameters, tick_s)
+        self.constants: Vector = pitch_constants(parameters, tick_s)
         self._start = start or (0.0, 0.0, 0.0, 0.0)
-
-    def initial(self) -> Vector:
-        """Return the state that both ends begin with."""
-        return self._start
-
-    def measured(self, state: Vector) -> Vector:
-        """Return the pitch angle, the one measured axis."""
-        return state[:1]
-
-    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `pitch_tick`."""
-        return pitch_tick(state, command, held, self.constants)

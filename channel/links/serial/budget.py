@@ -21,9 +21,6 @@ from channel.protocol.wire import encode
 
 LINE_BITS_PER_BYTE = 10
 
-USUAL_RATES_BAUD = (110, 300, 600, 1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400)
-"""of serial ports"""
-
 
 def message_bytes(terms: Terms, codec: Codec) -> int:
     """Return the bytes of a command frame, without a line's framing."""
@@ -36,7 +33,7 @@ def message_bytes(terms: Terms, codec: Codec) -> int:
 
 def command_bytes(terms: Terms, codec: Codec) -> int:
     """Return the bytes of a command frame, COBS and delimiters included; 1 for a down symbol."""
-    if terms.downlink == "narrow":
+    if terms.is_narrow:
         return 1
     # COBS adds a byte for every 254; a frame full of zeros is not shorter.
     content = message_bytes(terms, codec)
@@ -45,7 +42,7 @@ def command_bytes(terms: Terms, codec: Codec) -> int:
 
 def down_bits_per_s(terms: Terms, codec: Codec) -> float:
     """Return the line bits of the command frames, or of the down symbols."""
-    if terms.downlink == "narrow":
+    if terms.is_narrow:
         return symbol_bits_per_s(terms.down_grid)
     return 1e9 / terms.sample_ns * command_bytes(terms, codec) * LINE_BITS_PER_BYTE
 
@@ -59,11 +56,6 @@ def least_rate_baud(terms: Terms, codec: Codec) -> int:
     """Return the slowest line that carries both directions."""
     bits_per_s = max(symbol_bits_per_s(terms.up_grid), down_bits_per_s(terms, codec))
     return math.ceil(bits_per_s - 1e-6)
-
-
-def usual_rate_baud(least: int) -> int:
-    """Return the rate that ports have and that is no less; the least itself beyond them."""
-    return next((rate for rate in USUAL_RATES_BAUD if rate >= least), least)
 
 
 def check_up(terms: Terms, line_rate_baud: int) -> None:
@@ -83,7 +75,7 @@ def _check_symbols(direction: str, grid: SlotGrid, line_rate_baud: int, remedy: 
 
 def check_down(terms: Terms, codec: Codec, line_rate_baud: int) -> None:
     """Raise ValueError, with the arithmetic, where the line cannot carry the downlink."""
-    if terms.downlink == "narrow":
+    if terms.is_narrow:
         _check_symbols("downlink", terms.down_grid, line_rate_baud, "lower channel.downlink_baud")
         return
     bits_per_s = down_bits_per_s(terms, codec)
@@ -110,7 +102,7 @@ def byte_ns(count: int, line_rate_baud: int) -> int:
 def check_slot_counter(terms: Terms, wire: SerialWire) -> None:
     """Raise ValueError where the counter bits of a symbol byte could not tell slots apart."""
     _check_counter("deadline_allowance_s", terms.up_grid, wire.slot_modulus)
-    if terms.downlink == "narrow":
+    if terms.is_narrow:
         _check_counter("downlink_budget_s", terms.down_grid, wire.slot_modulus)
 
 

@@ -66,8 +66,7 @@ class SerialKind(LinkKind):
         settings = end.settings
         wire = _wire(end.codec)
         terms = end.terms
-        is_narrow = terms.downlink == "narrow"
-        grids = (terms.up_grid, terms.down_grid) if is_narrow else (terms.up_grid,)
+        grids = (terms.up_grid, terms.down_grid) if terms.is_narrow else (terms.up_grid,)
         slot_s = min(grid.length_ns for grid in grids) / 1e9
 
         def on_port(port: str, rate_baud: int) -> SerialLink:
@@ -78,7 +77,7 @@ class SerialKind(LinkKind):
                 line_rate_baud=rate_baud,
                 symbol_age_max_s=slot_s * wire.slot_modulus / 2,
                 insecure=end.place.get("insecure", False),
-                is_narrow=is_narrow,
+                is_narrow=terms.is_narrow,
             )
 
         up = on_port(settings.port, settings.line_rate_baud)

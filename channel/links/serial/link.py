@@ -23,6 +23,7 @@ from channel.errors import LinkError
 from channel.links.base import Link, Role
 from channel.links.serial.budget import LINE_BITS_PER_BYTE
 from channel.links.serial.port import check_port, open_port, reason_of
+from channel.links.serial.slot_finder import START_NS
 from channel.links.serial.stream import Deframer, Received
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice
 from channel.protocol.wire import Wire
@@ -53,6 +54,7 @@ class SerialLink(Link):
     """
 
     name = "serial"
+    start_ns = START_NS
 
     def __init__(
         self,

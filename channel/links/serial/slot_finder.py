@@ -8,43 +8,29 @@ that fit each other and not the schedule replaces it.
 
 The transmitter, to which down symbols come, knows the schedule: it counts from its own tick 0
 (`expect`). At the receiver it is known before the first symbol from the handshake: tick 0 lies between
-the end of the answer to its hello and `START_NS` later. A wrong guess anywhere here is a wrong or an
-erased symbol, which the echo covers.
+the end of the answer to its hello and `START_NS` later (`Link.start_ns`). A later hello names the
+transmitter's sample: a schedule that contradicts it is forgotten. A wrong guess anywhere here is a
+wrong or an erased symbol, which the echo covers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import NamedTuple
 
 from channel.protocol.frames import Frame, Hello, LocatedSymbol, ShortSymbol, Welcome
+from channel.protocol.rivals import Rivals
 from channel.protocol.terms import SlotGrid
 
 START_NS = 250_000_000
 """The hello is answered, the welcome travels, the transmitter begins: all within this."""
 START_SLACK_NS = 50_000_000
+HELLO_SLOTS = 3.0
+"""How far the sample of a hello may be off the schedule: the transmitter may have been held up."""
 
-RIVALS = 3
 RIVAL_SLOTS = 0.25
 EARLY_SLOTS = 0.5
 LATE_SLOTS = 0.5
 GAIN_MIN = 1.0 / 16.0
-
-
-class Place(NamedTuple):
-    """The location of a symbol byte; as in `LocatedSymbol`."""
-
-    slot: int | None
-    in_time: bool
-    anchor: tuple[int, int] | None
-
-
-@dataclass(slots=True)
-class _Rival:
-    slot: int
-    time_ns: int
-    count: int = 1
 
 
 class SlotFinder:
@@ -60,42 +46,37 @@ class SlotFinder:
         self._zero_ns: float | None = None
         """when slot 0 would have arrived, by the schedule"""
         self._taken = 0
-        self._rival: _Rival | None = None
+        self._rivals = Rivals(self._slot_ns, max(RIVAL_SLOTS, self._allowance))
         self._incarnation: int | None = None
         """of the transmitter that flies"""
 
-    def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
-        """Note the session's answer to a hello, which is on the line until `now_ns`."""
+    def answered(self, hello: Hello, answers: Iterable[Frame], asked_ns: int, now_ns: int) -> None:
+        """Note the answer to a hello that left at `asked_ns`; it is on the line until `now_ns`."""
         for answer in answers:
-            if isinstance(answer, Welcome) and answer.incarnation != self._incarnation:
-                self._incarnation = answer.incarnation
+            if isinstance(answer, Welcome) and self._is_news(hello, asked_ns):
+                self._incarnation, self._zero_ns = hello.incarnation, None
+                self._rivals.clear()
                 ahead = answer.first_sample - hello.sample if hello.sample else 0
-                self.begin(answer.first_sample * self._grid.slots, ahead * self._grid.slots)
-        self.greeted(now_ns)
+                self._first_slot = answer.first_sample * self._grid.slots
+                self._ahead_ns = ahead * self._grid.sample_ns
+        if self._zero_ns is None:
+            self._greeted_ns = now_ns
 
     def expect(self, line_delay_ns: int = 0) -> None:
         """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
         self._zero_ns = self._grid.due_ns(0) + line_delay_ns // 2
 
-    def located(self, symbol: ShortSymbol, due_slot: int, now_ns: int) -> LocatedSymbol:
-        """Return a symbol byte that came at `now_ns` with its slot; `due_slot` is not settled yet."""
-        place = self.find(symbol, due_slot, now_ns)
-        return LocatedSymbol(symbol.number, place.slot, symbol.slot_low, place.in_time, place.anchor)
+    def _is_news(self, hello: Hello, asked_ns: int) -> bool:
+        """Return whether the schedule is not that of the transmitter that asks."""
+        if self._zero_ns is None or hello.incarnation != self._incarnation:
+            return True
+        count = self._grid.slots
+        place = (asked_ns - self._zero_ns + self._grid.delivery_ns) / self._slot_ns
+        ahead = hello.sample * count - place
+        return hello.sample > 0 and not -HELLO_SLOTS <= ahead <= count + HELLO_SLOTS
 
-    def greeted(self, now_ns: int) -> None:
-        """Note the time of a hello that was answered with a welcome."""
-        if self._zero_ns is None:
-            self._greeted_ns = now_ns
-
-    def begin(self, first_slot: int, ahead_slots: int) -> None:
-        """Forget the schedule: another transmitter begins, `ahead_slots` after its hello."""
-        self._zero_ns = None
-        self._rival = None
-        self._first_slot = first_slot
-        self._ahead_ns = round(ahead_slots * self._slot_ns)
-
-    def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> Place:
-        """Return where a symbol byte that came at `now_ns` belongs; `expected` is not settled yet."""
+    def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> LocatedSymbol:
+        """Return a symbol byte that came at `now_ns` with its slot; `expected` is not settled yet."""
         if self._zero_ns is None:
             return self._first(symbol, now_ns)
         place = (now_ns - self._zero_ns) / self._slot_ns
@@ -105,18 +86,18 @@ class SlotFinder:
         # this is one of a heap that waited while this process did not run.
         in_time = slot >= expected and -early <= max(LATE_SLOTS, 2.0 * self._allowance)
         if in_time and early <= max(EARLY_SLOTS, self._allowance):
-            self._rival = None
+            self._rivals.clear()
             self._taken += 1
             gain = max(GAIN_MIN, 1.0 / (1.0 + self._taken))
             self._zero_ns -= gain * early * self._slot_ns
             due_ns = round(self._zero_ns + slot * self._slot_ns)
-            return Place(slot, True, (slot, max(now_ns, due_ns)))
-        if self._is_rival(slot, now_ns):
+            return _located(symbol, slot, True, (slot, max(now_ns, due_ns)))
+        if self._rivals.complete(slot, now_ns):
             self._start(slot, now_ns)
-            return Place(slot, slot >= expected, (slot, now_ns))
-        return Place(None if early > 0.0 and slot >= expected else slot, False, None)
+            return _located(symbol, slot, slot >= expected, (slot, now_ns))
+        return _located(symbol, None if early > 0.0 and slot >= expected else slot)
 
-    def _first(self, symbol: ShortSymbol, now_ns: int) -> Place:
+    def _first(self, symbol: ShortSymbol, now_ns: int) -> LocatedSymbol:
         since_ns = now_ns - self._greeted_ns - self._grid.delivery_ns - self._ahead_ns
         first = self._first_slot
         place = (since_ns - START_NS / 2) / self._slot_ns
@@ -124,26 +105,20 @@ class SlotFinder:
         earliest = first + (since_ns - START_NS) / self._slot_ns - EARLY_SLOTS
         latest = first + (since_ns + START_SLACK_NS) / self._slot_ns + EARLY_SLOTS
         if not earliest <= slot <= latest:
-            return Place(None, False, None)
+            return _located(symbol, None)
         self._start(slot, now_ns)
-        return Place(slot, True, (slot, now_ns))
+        return _located(symbol, slot, True, (slot, now_ns))
 
     def _start(self, slot: int, now_ns: int) -> None:
         self._zero_ns = now_ns - slot * self._slot_ns
         self._taken = 0
-        self._rival = None
+        self._rivals.clear()
 
-    def _is_rival(self, slot: int, now_ns: int) -> bool:
-        """Return whether this byte is the last of a row that fits itself."""
-        rival = self._rival
-        if rival is not None:
-            slots = (now_ns - rival.time_ns) / self._slot_ns
-            off = abs(slot - rival.slot - slots)
-            if slot > rival.slot and off <= max(RIVAL_SLOTS, self._allowance):
-                self._rival = _Rival(slot, now_ns, rival.count + 1)
-                return self._rival.count >= RIVALS
-        self._rival = _Rival(slot, now_ns)
-        return False
+
+def _located(
+    symbol: ShortSymbol, slot: int | None, in_time: bool = False, anchor: tuple[int, int] | None = None
+) -> LocatedSymbol:
+    return LocatedSymbol(symbol.number, slot, symbol.slot_low, in_time, anchor)
 
 
 def _nearest(symbol: ShortSymbol, place: float) -> int:

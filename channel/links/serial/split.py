@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from operator import add
+
 from channel.links.base import Link, LinkCounts, Role
 from channel.protocol.frames import DownSymbol, Frame
 from channel.protocol.wire import Wire, is_short
@@ -39,23 +42,16 @@ class SplitLink(Link):
     def __init__(self, role: Role, up: Link, down: Link) -> None:
         self.name = f"{up.name} up, {down.name} down"
         self.wire: Wire = SplitWire(up.wire, down.wire)
+        self.start_ns = up.start_ns
         self._out, self._in = (up, down) if role == "transmitter" else (down, up)
 
     @property
     def counts(self) -> LinkCounts:
-        """Return what went out on the one, came in on the other, and was dropped on both."""
-        out, come = self._out.counts, self._in.counts
-        return LinkCounts(
-            messages_out=out.messages_out,
-            bytes_out=out.bytes_out,
-            messages_in=come.messages_in,
-            bytes_in=come.bytes_in,
-            dropped=out.dropped + come.dropped,
-            refused=out.refused + come.refused,
-            reconnects=out.reconnects + come.reconnects,
-            line_bytes_out=out.line_bytes_out + come.line_bytes_out,
-            line_bytes_in=out.line_bytes_in + come.line_bytes_in,
-        )
+        """Return the sums: messages go out on the one and come in on the other only."""
+        both = self._out.counts, self._in.counts
+        names = [one.name for one in fields(LinkCounts)]
+        first, second = ([getattr(counts, name) for name in names] for counts in both)
+        return LinkCounts(*map(add, first, second))
 
     def send(self, data: bytes) -> None:
         self._out.send(data)

@@ -13,7 +13,6 @@ import re
 import sys
 import threading
 from collections import Counter
-from collections.abc import Callable
 from contextlib import suppress
 from queue import SimpleQueue
 from typing import Self, TextIO
@@ -98,9 +97,8 @@ class HandshakeLog:
     logs (RUST_LOG) goes to standard error. Once per process: Zenoh sets its log up only once.
     """
 
-    def __init__(self, on_refused: Callable[[str, int], None] | None = None) -> None:
+    def __init__(self) -> None:
         self.refused: Counter[str] = Counter()
-        self._on_refused = on_refused or _report
 
     def __enter__(self) -> Self:
         sys.stdout.flush()
@@ -141,17 +139,13 @@ class HandshakeLog:
             return
         reason = reason_of(found["text"])
         self.refused[reason] += 1
-        self._on_refused(reason, self.refused[reason])
+        if _is_reported(self.refused[reason]):
+            _say(reason, self.refused[reason])
 
 
 def _is_reported(count: int) -> bool:
     """Return whether it is the first time, or the count has another digit."""
     return str(count).rstrip("0") == "1"
-
-
-def _report(reason: str, count: int) -> None:
-    if _is_reported(count):
-        _say(reason, count)
 
 
 def _say(reason: str, count: int) -> None:

@@ -32,7 +32,7 @@ def test_when_words_are_settled_then_their_slots_follow_and_all_are_due_within_t
     grid = some.down_grid
     assert [grid.slot_ns(slot) for slot in range(5)] == [23 * MS, 48 * MS, 73 * MS, 98 * MS, 123 * MS]
     assert grid.due_ns(3) == 100 * MS
-    assert some.down_heard_ns == grid.due_ns(3) + some.downlink_budget_ns
+    assert some.heard_ns == grid.due_ns(3) + some.downlink_budget_ns
     late = narrow(4, delivery="end").down_grid
     assert (late.slot_ns(0), late.due_ns(0)) == (120 * MS, 145 * MS)
 

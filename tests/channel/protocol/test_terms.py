@@ -131,7 +131,7 @@ def test_when_samples_are_short_then_the_bound_on_lag_is_a_time(period_ns: int, 
 def test_when_the_downlink_is_narrow_then_a_coded_command_waits_for_all_symbols_of_its_sample() -> None:
     narrow = terms().narrowed(20.0, 2, is_mirrored=False)
     # 20 ms until the word is settled, 50 ms to the second slot, 10 ms on the way.
-    assert (narrow.down_slot_ns(1), narrow.down_heard_ns) == (70 * MS, 80 * MS)
+    assert (narrow.down_grid.slot_ns(1), narrow.heard_ns) == (70 * MS, 80 * MS)
     assert narrow.with_shortest_lead("virtual").lead_ticks == narrow.lead_needed_ticks == 8
     with pytest.raises(ValueError) as caught:
         replace(narrow, lead_ticks=7).check("real")
@@ -146,7 +146,7 @@ def test_when_the_law_is_mirrored_then_the_real_clock_needs_no_lead() -> None:
     mirrored = terms(delivery="end", lead_ticks=0).narrowed(20.0, 2, is_mirrored=True)
     assert mirrored.with_shortest_lead("real").lead_ticks == 0
     mirrored.check("real")
-    assert mirrored.down_heard_ns == (100 + 20 + 50 + 50 + 10) * MS
+    assert mirrored.heard_ns == (100 + 20 + 50 + 50 + 10) * MS
 
 
 def test_when_the_down_line_carries_no_symbol_a_sample_then_the_numbers_are_named() -> None:

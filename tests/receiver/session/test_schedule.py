@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import random
 
-from receiver.session.schedule import EARLY_SAMPLES, RIVALS, Schedule, Timing
+from channel.protocol.rivals import RIVALS
+from receiver.session.schedule import EARLY_SAMPLES, Schedule, Timing
 from tests.channel.codec.parts import terms
 
 PERIOD_NS = 100_000_000

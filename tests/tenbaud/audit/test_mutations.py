@@ -14,10 +14,11 @@ from tenbaud.audit.audit import Audit, audit, audit_record
 from tenbaud.audit.base import FILED, Evidence
 from tenbaud.audit.table import CLAIMS
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.kinds import KINDS
 from tenbaud.recording.reader import Recording
 from tenbaud.replay.record import FlightRecord, load_record
 from tenbaud.replay.replay import replay
-from tenbaud.replay.rows import KINDS, read_rows
+from tenbaud.replay.rows import read_rows
 from tests.tenbaud.audit.mutations import Mutation, Original, write_recording
 from tests.tenbaud.audit.unclaimed import ORDER, UNCLAIMED, reason_for
 from tests.tenbaud.flown import flown
@@ -93,8 +94,8 @@ def test_every_change_of_a_flight_is_found(tmp_path: Path) -> None:
 
 
 def test_every_change_of_a_narrow_flight_is_found(tmp_path: Path) -> None:
-    narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.03"}
-    run = flown(tmp_path / "run", duration_s=3.4, **narrow)
+    narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.05"}
+    run = flown(tmp_path / "run", duration_s=2.0, **narrow)
     tried, found, missed = survey(run.path, tmp_path / "mutant", 1)
     assert tried > 110
     assert not missed, "\n".join([f"seed {SEED}", *missed])

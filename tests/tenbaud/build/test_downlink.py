@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import random
+import warnings
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,9 +23,12 @@ from tenbaud.build.downlink import build_two_way
 from tenbaud.build.ends import build_receiver, build_transmitter
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.parts import Parts
+from tenbaud.build.recorded import flight_config
 from tenbaud.build.references import build_references
-from tenbaud.config.load import ConfigError, load_config
-from tenbaud.telemetry.end import _steered
+from tenbaud.config.load import ConfigError, dump_config, load_config
+from tenbaud.flight.fly import fly
+from tenbaud.telemetry.end import steered
+from tests.tenbaud.build import own_laws
 
 MS = 1_000_000
 
@@ -150,6 +155,18 @@ def test_other_downlinks_ignore_the_fields_of_the_narrow_one() -> None:
     assert {"downlink", "downlink_baud"}.isdisjoint(json.loads(plain.shared_json(0))["channel"])
 
 
+def test_a_person_who_sets_fields_of_the_narrow_downlink_for_another_is_warned(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text('preset = "tuned-10baud"\n[downlink]\nbits = 8\n')
+    with pytest.warns(UserWarning, match=r'^channel\.downlink_baud, downlink\.bits: .* = "full": set'):
+        config = flight_config(None, own, {"channel": {"downlink_baud": 10.0}})
+    own.write_text(dump_config(config))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        flight_config(None, own)
+        flight_config(None, own, {"channel": {"downlink": "narrow"}, "downlink": {"bits": 7}})
+
+
 def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> None:
     designed = agreed("servo-10baud")
     law = json.loads(designed.identity.config)["downlink"]["law"]
@@ -196,6 +213,14 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
             "announce_s = 60 is 1200 samples, more than the 1000",
         ),
         ({"receiver__reference": {"kind": "none"}}, "no output has a set-point"),
+        (
+            {"downlink__directions": [[0.5, -0.5]], "downlink__range_max": 0.7},
+            r'downlink\.directions, downlink\.range_max: only for the scheme "coded", .* leave it out',
+        ),
+        (
+            {"downlink__scheme": "coded", "downlink__bits": 8},
+            r'downlink\.bits: only for the scheme "mirrored", .* set downlink\.scheme = "mirrored"',
+        ),
         ({"timing__lead_ticks": 7, "downlink__scheme": "coded"}, "need lead_ticks >= 8"),
         ({"downlink__scheme": "coded", "downlink__directions": [[1.0]]}, r"1 row\(s\) of 1 numbers"),
         ({"downlink__scheme": "coded", "downlink__feedback": [[1.0]]}, r"downlink\.feedback has 1 row"),
@@ -243,9 +268,24 @@ def test_a_law_from_outside_is_mirrored_where_it_keeps_to_the_rules() -> None:
     assert command == (1.5, -1.5)
 
 
+@pytest.mark.parametrize("sort", [own_laws.Keeping, own_laws.Plain])
+def test_the_law_of_a_class_that_a_program_gives_is_mirrored_if_it_has_one(
+    sort: Any, tmp_path: Path
+) -> None:
+    settings = {"duration_s": 1.0, "downlink.scheme": "mirrored"}
+    given: dict[str, Any] = {"controller": sort, "downlink": "narrow", "settings": settings}
+    if sort is own_laws.Plain:
+        with pytest.raises(ConfigError, match="object:Plain has none: give it an attribute `mirrored`"):
+            fly("tuned-10baud", **given, out=tmp_path / "run")
+        return
+    run = fly("tuned-10baud", **given, out=tmp_path / "run")
+    assert run.summary is not None
+    assert run.summary["narrow"]["scheme"] == "mirrored"
+
+
 def test_a_set_point_by_hand_is_held_to_the_range_of_its_words() -> None:
     agreement = replace(agreed(), live=True)
-    steering = _steered(agreement)
+    steering = steered(agreement)
     assert steering is not None
     assert steering[0] is not None
     one = mirrored(agreement).ranges[0]

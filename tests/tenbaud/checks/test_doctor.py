@@ -2,8 +2,10 @@ from __future__ import annotations
 
 import socket
 
+import pytest
+
 from tenbaud.build.flight import agree
-from tenbaud.checks.doctor import examine, report, serial_line
+from tenbaud.checks.doctor import examine, narrow_downlink, report, serial_line
 from tenbaud.config.load import load_config
 
 
@@ -25,6 +27,23 @@ def test_the_least_rate_of_a_serial_line_is_said_for_each_downlink() -> None:
     assert found.state == "ok"
     rates = "16800 baud full, 1900 baud compact, 200 baud narrow"
     assert f"at least {rates} (channel.downlink)" in found.text
+
+
+@pytest.mark.parametrize(
+    ("preset", "scheme", "state", "words"),
+    [
+        ("tuned-10baud", "auto", "ok", "a set-point by hand acts 1.5 s after it is given"),
+        ("tuned-10baud", "coded", "ok", "commands come down, decided 0.08 s ahead"),
+        ("helicopter-10baud", "auto", "note", "change within 1.6 s, the second acts up to 1.6 s late"),
+    ],
+)
+def test_a_narrow_downlink_says_when_set_points_act(
+    preset: str, scheme: str, state: str, words: str
+) -> None:
+    over = {"channel": {"downlink": "narrow"}, "downlink": {"scheme": scheme}}
+    (found,) = narrow_downlink(agree(load_config(preset, None, over), "real"))
+    assert found.state == state
+    assert words in found.text
 
 
 def test_an_endpoint_is_reached_or_not() -> None:

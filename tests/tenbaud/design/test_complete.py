@@ -238,6 +238,21 @@ def test_when_the_command_completes_a_file_then_it_flies(tmp_path: Path) -> None
         assert "20 bit/s" in shown.output
 
 
+def test_when_the_downlink_is_narrow_then_the_law_of_both_ends_is_in_the_completed_file(
+    tmp_path: Path,
+) -> None:
+    source, made = tmp_path / "plant.toml", tmp_path / "flight.toml"
+    source.write_text(FILE + 'receiver = {controller = "state_feedback", reference.amplitude = 0.2}')
+    words = ["design", "--config", str(source), "--out", str(made)]
+    for settings, narrow in ((), False), (("--set", "channel.downlink=narrow"), True):
+        done = CliRunner().invoke(app, [*words, *settings])
+        assert done.exit_code == 0, done.output
+        assert ("law" in tomllib.loads(made.read_text()).get("downlink", {})) is narrow
+    written = tomllib.loads(made.read_text())["downlink"]["law"]
+    shared = json.loads(agree(load_config(None, made), "virtual").identity.config)
+    assert shared["downlink"]["law"] == written
+
+
 def test_when_a_configuration_is_too_slow_for_its_plant_then_its_floor_says_what_is_needed(
     tmp_path: Path,
 ) -> None:

@@ -56,7 +56,7 @@ def test_a_good_flight_is_its_verdict_and_six_lines(tmp_path: Path) -> None:
     assert "0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after the first 25 s" in text
     assert "0 words lost, 0 late, 0 resyncs" in text
     assert "rad" not in text
-    assert lines[-1].endswith("Next: tenbaud demo --view")
+    assert lines[-1].endswith(f"Next: tenbaud replay {tmp_path}")
 
 
 def test_a_downlink_that_is_not_full_says_its_bits(tmp_path: Path) -> None:

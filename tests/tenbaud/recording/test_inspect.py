@@ -4,20 +4,18 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from tenbaud.recording.inspect import describe, describe_json, describe_text
+from tenbaud.recording.inspect import describe_json, describe_text
 from tests.tenbaud.flown import flown
 from tests.tenbaud.recording.rows import EVENT, Rows
 
 
 def test_run_folder_is_described_file_by_file(tmp_path: Path, fly: Callable[..., Path]) -> None:
     folder = fly(tmp_path / "run", ticks=100)
-    transmitter, receiver = describe(folder)
-    assert (transmitter.recording.path.name, receiver.recording.path.name) == (
-        "transmitter.mcap",
-        "receiver.mcap",
-    )
-    assert transmitter.recording.complete
-    assert transmitter.rows_dropped == 0
+    transmitter, receiver = describe_json(folder)
+    names = [Path(one["path"]).name for one in (transmitter, receiver)]
+    assert names == ["transmitter.mcap", "receiver.mcap"]
+    assert transmitter["complete"]
+    assert transmitter["rows_dropped"] == 0
     text = describe_text(folder)
     for words in (
         "complete",
@@ -44,11 +42,24 @@ def test_a_real_run_is_headed_by_its_figures_and_its_configuration_is_readable(t
     assert described[0]["topics"]["tick"]["rows"] == 300
 
 
+def test_a_narrow_run_is_described_by_its_down_symbols_and_what_is_certain(tmp_path: Path) -> None:
+    run = flown(tmp_path / "narrow", duration_s=6.0, channel__downlink="narrow")
+    text = describe_text(run.path)
+    summary, certain = text.splitlines()[:2]
+    confirmed = run.summary["narrow"]["samples_confirmed"]
+    assert summary.endswith(f"60 bits up, 120 bits down, {confirmed} of 60 samples confirmed")
+    assert certain.startswith("  certain after ")
+    assert "echo" not in text
+    assert "  as above: preset, clock" in text, "the other end repeats nothing"
+    assert text.count("what kind of event") == text.count("its down symbols in the order of") == 1
+    assert len(text.splitlines()) < 170
+
+
 def test_cut_file_is_called_cut(tmp_path: Path, fly: Callable[..., Path]) -> None:
     path = fly(tmp_path / "run", ticks=100) / "transmitter.mcap"
     path.write_bytes(path.read_bytes()[:-100])
-    [description] = describe(path)
-    assert not description.recording.complete
+    [description] = describe_json(path)
+    assert not description["complete"]
     assert "cut: these are the rows up to the cut" in describe_text(path)
     assert f"`tenbaud recover {path}`" in describe_text(path)
 

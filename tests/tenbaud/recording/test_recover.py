@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -38,6 +40,32 @@ def whole_rows(path: Path) -> int:
         assert summary is not None
         assert summary.statistics is not None
         return summary.statistics.message_count
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_no_open_file_is_renamed_or_replaced_as_windows_would_refuse_it(
+    flight: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    cut = tmp_path / "transmitter.mcap"
+    cut.write_bytes(flight.folder.transmitter.read_bytes()[:100_000])
+    renamed: list[Path] = []
+
+    def watching(move: Callable[[Path, Path], Path]) -> Callable[[Path, Path], Path]:
+        def watched(source: Path, target: Path) -> Path:
+            opened = {os.path.realpath(one) for one in Path("/proc/self/fd").iterdir()}
+            assert opened.isdisjoint({str(source), str(target)})
+            renamed.append(source)
+            return move(source, target)
+
+        return watched
+
+    monkeypatch.setattr(Path, "replace", watching(Path.replace))
+    monkeypatch.setattr(Path, "rename", watching(Path.rename))
+    if not links:
+        monkeypatch.setattr(Path, "hardlink_to", lambda *_: (_ for _ in ()).throw(OSError))
+    recover(cut)
+    assert len(renamed) == (1 if links else 2)
+    assert whole_rows(cut) > 0
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.999])

@@ -106,7 +106,7 @@ def test_when_nothing_is_confirmed_any_more_then_commands_stop_after_four_usual_
     pair = Pair()
     pair.fly(50)
     assert None not in pair.commands[PER_SAMPLE:]
-    pair.transmitter.take_confirmed()
+    pair.following.take_confirmed()
     sure = pair.following.hypotheses.next_confirmed
     usual = median(pair.rows.column("confirmed", "lag_samples"))
     assert pair.following._age_max == max(AGE_LEAST_SAMPLES, round(AGE_FACTOR * usual))
@@ -132,7 +132,7 @@ def test_when_no_symbol_comes_any_more_then_commands_stop_after_twelve_slots() -
     missing = [
         tick for tick, command in enumerate(pair.commands) if command is None and tick > PER_SAMPLE
     ]
-    silent_ns = SILENT_SLOTS * TERMS.sample_ns // 2 + TERMS.down_heard_ns
+    silent_ns = SILENT_SLOTS * TERMS.sample_ns // 2 + TERMS.heard_ns
     # The last symbols came at the first tick of sample 49.
     assert missing[0] == 49 * PER_SAMPLE + -(-silent_ns // TICK_NS) + 1
 

@@ -138,7 +138,7 @@ class Branching:
     def _chances(self, sent: Word, after_erasure: bool) -> Chances:
         if sent is ERASED:
             return Chances(0.0, 1.0, 0.0, 0.0)
-        erased, flip = self._priors.erased(after_erasure), self._priors.flipped
+        erased, flip = self._priors.erased(after_erasure), self._priors.flipped.value
         arrived, others = 1.0 - erased, self._others(sent)
         more = 0.5 * flip * flip * (len(sent) - 1) / len(sent)
         return Chances(arrived * (1.0 - flip), erased, arrived * (flip - more) / others, arrived * more)
@@ -149,7 +149,7 @@ class Branching:
 
     def _hash_chances(self, state: TwoWayState, heard: Symbols, digest: int) -> Hashed:
         """Return how likely these hash symbols come down; without digest, for the first one alone."""
-        flip, bits = self._priors.down_flipped, self._machine.hashed(state, digest)
+        flip, bits = self._priors.down_flipped.value, self._machine.hashed(state, digest)
         # Of the first symbol, the second, and all others, with a word that is whole and with none.
         first = second = others = (1.0, 1.0)
         for place, one in enumerate(heard):
@@ -169,7 +169,8 @@ class Branching:
 
     def _options(self, state: TwoWayState, heard: Symbols) -> list[Option]:
         """Return all command symbols of a sample, with their chances and those of what came."""
-        scheme, flip, news = self._machine.scheme, self._priors.down_flipped, self._priors.news
+        scheme, priors = self._machine.scheme, self._priors
+        flip, news = priors.down_flipped.value, priors.news.value
         found: list[tuple[Symbols, float, Vector]] = [((), 1.0, state.down)]
         for place, came in enumerate(heard):
             longer = []

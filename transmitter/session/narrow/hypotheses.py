@@ -16,10 +16,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from channel.codec.codec import ERASED, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.protocol.events import ASKED, Event
 from channel.protocol.frames import Why
 from transmitter.session.narrow.branches import Branched, Branching
 from transmitter.session.narrow.paths import Node, Paths, Symbols
@@ -39,16 +41,11 @@ NUMBERS_BESIDE = 100
 
 
 class Rejoin(NamedTuple):
-    """A request for a common state, with its numbers."""
+    """A request for a common state."""
 
-    reason: Why
+    why: Why
     """REST, or LAG: no sample was confirmed for too long, or no hypothesis can be continued"""
-    sample: int
-    """the last one heard of"""
-    rest: float
-    """weight of the rest, in units of the list's"""
-    lag_samples: int
-    detail: str | None = None
+    details: Event
 
 
 class Settings(NamedTuple):
@@ -282,27 +279,24 @@ class Hypotheses:
                 f"{len(heard)} down symbols of sample {sample} came; those of sample {self.next_heard} "
                 f"are next, {count} of them"
             )
-        sent = self._unheard.popleft() if self._unheard else ERASED
-        self._unconfirmed.append((sent, heard))
+        sent = self._unheard[0] if self._unheard else ERASED
         self._ahead = None
         if not self._select(self._branching.of(self._members, sent, heard)):
-            self.rejoin = Rejoin(
-                Why.LAG, sample, self.rest, self._lag, "no hypothesis can be continued"
-            )
+            self.rejoin = self._rejoin(Why.LAG, "no hypothesis can be continued")
             return []
+        if self._unheard:
+            self._unheard.popleft()
+        self._unconfirmed.append((sent, heard))
         done = self._confirm()
-        reason = None
         if self.rest > 1.0:
-            reason = Why.REST
-        elif self._lag > self.settings.lag_samples_max:
-            reason = Why.LAG
-        if reason is not None:
-            self.rejoin = Rejoin(reason, sample, self.rest, self._lag)
+            self.rejoin = self._rejoin(Why.REST)
+        elif len(self._paths.path) > self.settings.lag_samples_max:
+            self.rejoin = self._rejoin(Why.LAG)
         return done
 
-    @property
-    def _lag(self) -> int:
-        return len(self._paths.path)
+    def _rejoin(self, why: Why, detail: str | None = None) -> Rejoin:
+        sample, lag = self.next_confirmed, len(self._paths.path)
+        return Rejoin(why, replace(ASKED, sample=sample, number=lag, value=self.rest, detail=detail))
 
     def _select(self, branched: Branched) -> bool:
         """Follow the branches that weigh enough, book the others; return whether there is one."""
@@ -382,7 +376,7 @@ class Hypotheses:
         self.priors.learn(sent, node.word, before.word)
         self.priors.learn_symbols(symbols, heard)
         if commands and machine.scheme.is_idle(before.state.down):
-            self.priors.learn_news(commands[0] == 1)
+            self.priors.news.count(commands[0] == 1)
         assert node.flown is not None  # only the root has none
         return Confirmed(
             sample=node.sample,

@@ -36,45 +36,29 @@ class Priors:
     """The shares of a line of both directions."""
 
     def __init__(self) -> None:
-        self._erased = Share(0.025)
-        self._erased_again = Share(0.4, 2.5)
-        self._flipped = Share(0.005)
-        self._down_flipped = Share(0.005)
-        self._news = Share(0.1)
+        self._erased = {False: Share(0.025), True: Share(0.4, 2.5)}
+        """words; by whether the word before was erased"""
+        self.flipped = Share(0.005)
+        """of words that arrived: one symbol is another than was sent"""
+        self.down_flipped = Share(0.005)
+        """of down symbols that arrived"""
+        self.news = Share(0.1)
+        """of command symbols that say if there is news: there is"""
 
     def erased(self, after_erasure: bool) -> float:
         """Return how likely a word is erased."""
-        return (self._erased_again if after_erasure else self._erased).value
-
-    @property
-    def flipped(self) -> float:
-        """How likely one symbol of a word that arrived is another than was sent."""
-        return self._flipped.value
-
-    @property
-    def down_flipped(self) -> float:
-        """How likely a down symbol that arrived is the other one."""
-        return self._down_flipped.value
-
-    @property
-    def news(self) -> float:
-        """How likely a command symbol is 1 that says if there is news."""
-        return self._news.value
+        return self._erased[after_erasure].value
 
     def learn(self, sent: Word, word: Word, before: Word) -> None:
         """Learn from a confirmed word, what was sent for it, and the word before it."""
         if sent is ERASED:
             return
-        (self._erased_again if before is ERASED else self._erased).count(word is ERASED)
+        self._erased[before is ERASED].count(word is ERASED)
         if word is not ERASED:
-            self._flipped.count(word != sent)
+            self.flipped.count(word != sent)
 
     def learn_symbols(self, sent: Sequence[int], heard: Sequence[int | None]) -> None:
         """Learn from the down symbols of a confirmed sample."""
         for one, other in zip(sent, heard, strict=True):
             if other is not None:
-                self._down_flipped.count(one != other)
-
-    def learn_news(self, news: bool) -> None:
-        """Learn from a command symbol that says if there is news."""
-        self._news.count(news)
+                self.down_flipped.count(one != other)

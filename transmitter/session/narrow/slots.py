@@ -96,5 +96,5 @@ class DownSlots:
 
     def _agreed_tick(self, sample: int) -> int:
         terms = self._terms
-        heard_ns = sample * terms.sample_ns + terms.down_heard_ns + self._line_delay_ns
+        heard_ns = sample * terms.sample_ns + terms.heard_ns + self._line_delay_ns
         return -(-heard_ns // terms.tick_ns)

@@ -13,7 +13,6 @@ from channel.links.serial.budget import (
     check_up,
     command_bytes,
     least_rate_baud,
-    usual_rate_baud,
 )
 from channel.links.serial.wire import SerialWire
 from tests.channel.codec.parts import pitch_codec, terms
@@ -63,7 +62,6 @@ def test_when_the_downlink_is_compact_then_2400_baud_carry_the_papers_flight() -
     with pytest.raises(ValueError, match=r"19 bytes.*= 1900 bit/s") as caught:
         check_down(compact, CODEC, 1899)
     assert "channel.downlink" not in str(caught.value)
-    assert [usual_rate_baud(rate) for rate in (1900, 2400, 2401, 10**6)] == [2400, 2400, 4800, 10**6]
 
 
 def test_when_the_downlink_is_narrow_then_a_symbol_is_a_byte_in_either_direction() -> None:

@@ -6,8 +6,9 @@ import random
 
 import pytest
 
-from channel.links.serial.slot_finder import RIVALS, Place, SlotFinder
-from channel.protocol.frames import ShortSymbol
+from channel.links.serial.slot_finder import SlotFinder
+from channel.protocol.frames import Hello, LocatedSymbol, ShortSymbol, Welcome
+from channel.protocol.rivals import RIVALS
 from tests.channel.codec.parts import terms
 
 MODULUS = 8
@@ -22,7 +23,7 @@ class Line:
 
     def __init__(self, start_ns: int = START_NS, allowance_ns: int = 20 * MS) -> None:
         self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns).up_grid)
-        self.finder.greeted(0)
+        self.finder.answered(Hello(5, "", b"", b""), [Welcome(77, 0, 0, 5)], 0, 0)
         self.start_ns = start_ns
         self.allowance_ns = allowance_ns
         self.expected = 0
@@ -31,7 +32,7 @@ class Line:
     def due_ns(self, slot: int) -> int:
         return self.start_ns + slot * SLOT_NS
 
-    def hear(self, slot_low: int, time_ns: int) -> Place:
+    def hear(self, slot_low: int, time_ns: int) -> LocatedSymbol:
         while self.anchor is not None and self._deadline_ns() < time_ns:
             self.expected += 1
         symbol = ShortSymbol(0, slot_low % MODULUS, MODULUS)
@@ -81,6 +82,23 @@ def test_when_the_grid_is_known_then_down_symbols_are_placed_from_the_first_one_
             assert not finder.find(ShortSymbol(0, noise, MODULUS), 0, came_ns + MS).in_time
 
 
+@pytest.mark.parametrize("off_slots", [0, MODULUS])
+def test_when_a_request_names_another_sample_than_the_schedule_then_it_is_begun_anew(
+    off_slots: int,
+) -> None:
+    line = Line()
+    for slot in range(3):
+        line.hear(slot, line.due_ns(slot + off_slots))  # it began late: all are taken for later ones
+    assert line.expected == 3 + off_slots
+    for request, sample in enumerate((12, 40), 1):
+        asked_ns = line.due_ns(sample + off_slots) - 90 * MS
+        again = Hello(5, "", b"", b"", request, sample=sample)
+        line.finder.answered(again, [Welcome(77, request, sample + 1, 5, request)], asked_ns, asked_ns)
+        line.expected, line.anchor = sample + 1, None
+        for slot in range(sample + 1, sample + 9):
+            assert line.hear(slot, line.due_ns(slot + off_slots)).slot == slot
+
+
 @pytest.mark.parametrize("first", [1, 3, 7, 8, 9, 20])
 def test_when_the_first_symbols_are_lost_then_the_first_that_comes_is_still_placed(first: int) -> None:
     line = Line()
@@ -109,7 +127,7 @@ def test_when_a_byte_of_noise_looks_like_a_later_slot_then_it_is_refused() -> No
     line = Line()
     line.hear(0, line.due_ns(0))
     for low in (2, 3, 4):
-        assert line.hear(low, line.due_ns(1) - 10 * MS) == Place(None, False, None)
+        assert line.hear(low, line.due_ns(1) - 10 * MS) == LocatedSymbol(0, None, low, False, None)
     assert line.hear(1, line.due_ns(1)).slot == 1
 
 
@@ -161,5 +179,5 @@ def test_when_a_heap_of_bytes_is_read_at_once_then_it_does_not_move_the_schedule
 def test_when_noise_comes_before_the_first_symbol_then_it_is_refused_if_it_cannot_be_due() -> None:
     line = Line()
     for low in range(2, MODULUS):
-        assert line.hear(low, 5 * MS) == Place(None, False, None)
+        assert line.hear(low, 5 * MS) == LocatedSymbol(0, None, low, False, None)
     assert line.hear(0, line.due_ns(0)).slot == 0

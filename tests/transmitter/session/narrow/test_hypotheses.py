@@ -187,7 +187,7 @@ def test_a_word_of_several_symbols_branches_into_one_changed_symbol_and_the_rest
     hypotheses.heard(0, None)
     words = {node.word for _, node in hypotheses._members}
     assert words == {(1, 1), ERASED, (0, 1), (-1, 1), (1, 0), (1, -1)}
-    assert hypotheses.rest == pytest.approx(2.0 * hypotheses.priors.flipped**2 / 4, rel=0.1)
+    assert hypotheses.rest == pytest.approx(2.0 * hypotheses.priors.flipped.value**2 / 4, rel=0.1)
     hypotheses, state = Hypotheses(machine), machine.initial()
     for sample in range(40):
         word: Word = (1, 1) if sample % 2 else (-1, -1)
@@ -291,9 +291,10 @@ def test_a_rejoin_is_asked_for_when_nothing_explains_what_comes() -> None:
     while flight.hypotheses.rejoin is None:
         flight.fly(1)
     asked = flight.hypotheses.rejoin
-    assert asked.reason is Why.REST
-    assert asked.rest > 1.0
-    assert asked.sample < 60
+    assert asked.why is Why.REST
+    assert asked.details.value is not None
+    assert asked.details.value > 1.0
+    assert flight.hypotheses.next_heard <= 60
     flight.fly(40)
     assert flight.hypotheses.rejoin is None
     assert flight.hypotheses.confirmed_state.sample > 50
@@ -322,12 +323,12 @@ def test_priors_follow_the_line_and_never_reach_zero() -> None:
         word = ERASED if case % 10 == 0 else (1,)
         priors.learn((1,), word, (1,))
         priors.learn_symbols((0, 1), (0, None))
-        priors.learn_news(False)
+        priors.news.count(False)
     assert priors.erased(False) == pytest.approx(0.1, abs=0.02)
     assert priors.erased(True) == pytest.approx(0.4)
-    assert 0.0 < priors.down_flipped < 2e-4
-    assert 0.0 < priors.flipped < 2e-4
-    assert 0.0 < priors.news < 3e-3
+    assert 0.0 < priors.down_flipped.value < 2e-4
+    assert 0.0 < priors.flipped.value < 2e-4
+    assert 0.0 < priors.news.value < 3e-3
     for _ in range(300):
         priors.learn((1,), ERASED, ERASED)
     assert priors.erased(True) > 0.9

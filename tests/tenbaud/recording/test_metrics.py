@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tenbaud import Run
-from tenbaud.flight.closing import closing_lines
+from tenbaud.flight.report import closing_lines
 from tenbaud.recording.errors import RecordingError
 from tests.tenbaud.flown import flown
 

@@ -14,7 +14,7 @@ from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.codec.signals import InputSignal, Signal, Signals
 from tenbaud import FlightResult, Run, fly
-from tenbaud.flight.closing import closing_lines
+from tenbaud.flight.report import closing_lines
 from tenbaud.recording.convert import convert
 from tenbaud.recording.encoding import SIGNALS_KEY, recorded_signals, signals_text
 from tenbaud.recording.errors import RecordingError

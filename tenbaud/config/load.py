@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,15 @@ _SPLIT = re.compile(r",\n\s+")
 
 class ConfigError(TenbaudError):
     """A configuration that cannot be used; the text names file, field, value and allowed range."""
+
+
+@contextmanager
+def config_errors(where: str = "") -> Iterator[None]:
+    """Within the `with`, a ValueError becomes a ConfigError that begins with `where`."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(f"{where}: {error}" if where else str(error)) from error
 
 
 def preset_names(what: str = "preset") -> list[str]:

@@ -67,17 +67,6 @@ Mismatch = Annotated[
     float | None,
     typer.Option(help="Model mismatch of the simulated plant, 10% or 0.1."),
 ]
-<<<<<<< HEAD
-LineRate = Annotated[int | None, typer.Option(help="Bits per second on the serial line (115200).")]
-Downlink = Annotated[
-    str | None,
-    typer.Option(
-        help="With --link serial: separate link for the commands, zenoh or a second port. What comes "
-        "down is --set channel.downlink=narrow, compact or full."
-    ),
-]
-=======
->>>>>>> merging
 Rig = Annotated[str | None, typer.Option(help=rigs.FORMS)]
 Disturbance = Annotated[
     str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
@@ -189,7 +178,8 @@ class _Configured:
     line_rate: int | None = None
     """Bits per second on the serial line (115200)."""
     downlink: str | None = None
-    """Separate link for the commands: zenoh, or a second serial port."""
+    """With --link serial: separate link for the commands, zenoh or a second port. What comes down is
+    --set channel.downlink=narrow, compact or full."""
     impair: Impair = None
     sabotage: str | None = None
     """Corrupt one bit of this end's codec on purpose, such as sample=500,field=range."""

@@ -24,11 +24,10 @@ from scipy.linalg import solve_discrete_are
 
 from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.linear import LinearModel
-from plant_sim.zero_order_hold import discretised
+from plant_sim.zero_order_hold import discretised, van_loan
 from reproduction.axes.alone import SAMPLES, SETTLING, UNKNOWN, products_of, root_of, squares_of
 from reproduction.limits.encoder import floor_behind_encoders
 from tenbaud.bounds.floor import floor, period_cost
-from tenbaud.bounds.linear import van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.direction import design_direction
 from tenbaud.design.observer import linear_observer

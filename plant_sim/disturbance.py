@@ -7,8 +7,9 @@ plant step. Every disturbance is a pure function of the step index, so steps may
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Final, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     # Loaded where torques are drawn: a plant without them flies on bare Python.
@@ -25,7 +26,7 @@ Pushes: TypeAlias = "np.ndarray[tuple[int, int], np.dtype[np.float64]]"
 
 # Numbers drawn at once: large enough that numpy's cost per call vanishes, small enough (128 kB as
 # Python floats) that the length of a run costs no memory.
-_BLOCK_STEPS: Final = 4096
+BLOCK_STEPS: Final = 4096
 
 # A time within this share of a step after a step's start counts as that start, so that 12.5 s is
 # step 1250 at 0.01 s whatever the rounding of the division.
@@ -40,13 +41,34 @@ class Disturbance(Protocol):
         ...
 
 
-@runtime_checkable
-class PlannedDisturbance(Disturbance, Protocol):
-    """A disturbance whose torques can be had in advance, as studies ask for them."""
+class PlannedDisturbance(ABC):
+    """A disturbance whose torques can be had in advance, as studies ask for them.
+
+    They are drawn in blocks of steps, of which only one is ever kept.
+    """
+
+    _block_index: int | None = None
+    _block: Sequence[float] = ()
+
+    def torque(self, step_index: int) -> float:
+        """Return the angular acceleration (rad/s^2) held over a step."""
+        block_index, offset = divmod(step_index, BLOCK_STEPS)
+        if block_index != self._block_index:
+            if step_index < 0:
+                raise ValueError(f"step_index is {step_index}; it must be at least 0")
+            self._block, self._block_index = self.draw(block_index).tolist(), block_index
+        return self._block[offset]
 
     def torques(self, steps: int) -> Torques:
-        """The torques of steps `0 ... steps - 1` at once, to the last bit those of `torque`."""
-        ...
+        """Return those of steps `0 ... steps - 1` at once, to the last bit those of `torque`."""
+        import numpy as np
+
+        blocks = range(-(-steps // BLOCK_STEPS))
+        return np.concatenate([np.empty(0), *(self.draw(index) for index in blocks)])[:steps]
+
+    @abstractmethod
+    def draw(self, block_index: int) -> Torques:
+        """Return the torques of a block."""
 
 
 def pushes_of(disturbances: Sequence[Disturbance | None], steps: int) -> Pushes:
@@ -57,16 +79,13 @@ def pushes_of(disturbances: Sequence[Disturbance | None], steps: int) -> Pushes:
     return np.column_stack(planned) if planned else np.zeros((1, len(disturbances)))
 
 
-class WhiteTorque:
+class WhiteTorque(PlannedDisturbance):
     """White torque: independent Gaussian values, one per step, of variance density / step.
 
     Divided this way the rate wanders equally far whatever the step: its variance grows by
     `spectral_density_rad2_s3` per second (two-sided density). Equal seeds give equal torques with
-    one version of numpy; the block number enters the seed, so only one block is ever kept. Each
-    `place` has values of its own.
+    one version of numpy; the block number enters the seed. Each `place` has values of its own.
     """
-
-    __slots__ = ("_block", "_block_index", "_deviation", "_key", "_seed")
 
     def __init__(
         self, spectral_density_rad2_s3: float, step_s: float, seed: int, place: int = 0
@@ -83,38 +102,19 @@ class WhiteTorque:
         self._deviation = math.sqrt(spectral_density_rad2_s3 / step_s)
         self._seed = seed
         self._key = (place,) if place else ()
-        self._block_index: int | None = None
-        self._block: list[float] = []
 
-    def torque(self, step_index: int) -> float:
-        block_index, offset = divmod(step_index, _BLOCK_STEPS)
-        if block_index != self._block_index:
-            if step_index < 0:
-                raise ValueError(f"step_index is {step_index}; it must be at least 0")
-            self._block = self._draw(block_index).tolist()
-            self._block_index = block_index
-        return self._block[offset]
-
-    def torques(self, steps: int) -> Torques:
-        import numpy as np
-
-        blocks = range(-(-steps // _BLOCK_STEPS))
-        return np.concatenate([np.empty(0), *(self._draw(index) for index in blocks)])[:steps]
-
-    def _draw(self, block_index: int) -> Torques:
+    def draw(self, block_index: int) -> Torques:
         from numpy.random import PCG64, Generator, SeedSequence
 
         sequence = SeedSequence(self._seed, spawn_key=(block_index, *self._key))
-        return Generator(PCG64(sequence)).standard_normal(_BLOCK_STEPS) * self._deviation
+        return Generator(PCG64(sequence)).standard_normal(BLOCK_STEPS) * self._deviation
 
 
-class StepTorque:
+class StepTorque(PlannedDisturbance):
     """A constant torque from `start_s` until `end_s`, or for ever: a push, or a hung weight.
 
     It acts on whole steps: on those that begin in `start_s <= t < end_s`.
     """
-
-    __slots__ = ("_end_step", "_start_step", "_torque_rad_s2")
 
     def __init__(
         self, start_s: float, torque_rad_s2: float, step_s: float, end_s: float | None = None
@@ -127,46 +127,31 @@ class StepTorque:
             raise ValueError(f"torque_rad_s2 is {torque_rad_s2}; it must be finite")
         if end_s is not None and not (math.isfinite(end_s) and end_s > start_s):
             raise ValueError(f"end_s is {end_s}; it must be finite and above start_s = {start_s}")
-        self._torque_rad_s2 = float(torque_rad_s2)
+        self._torque_rad_s2 = torque_rad_s2
         self._start_step = math.ceil(start_s / step_s - _STEP_TOLERANCE)
-        self._end_step = None if end_s is None else math.ceil(end_s / step_s - _STEP_TOLERANCE)
+        self._end_step = math.inf if end_s is None else end_s / step_s - _STEP_TOLERANCE
 
-    def torque(self, step_index: int) -> float:
-        if step_index < self._start_step:
-            return 0.0
-        if self._end_step is not None and step_index >= self._end_step:
-            return 0.0
-        return self._torque_rad_s2
-
-    def torques(self, steps: int) -> Torques:
+    def draw(self, block_index: int) -> Torques:
         import numpy as np
 
-        torques = np.zeros(steps)
-        torques[self._start_step : self._end_step] = self._torque_rad_s2
-        return torques
+        steps = np.arange(block_index * BLOCK_STEPS, (block_index + 1) * BLOCK_STEPS)
+        acts = (steps >= self._start_step) & (steps < self._end_step)
+        return np.where(acts, float(self._torque_rad_s2), 0.0)
 
 
-class Sum:
+class Sum(PlannedDisturbance):
     """Several disturbances at once."""
-
-    __slots__ = ("_parts",)
 
     def __init__(self, *parts: PlannedDisturbance) -> None:
         """Add up `parts`; of none at all the sum is 0."""
         self._parts = parts
 
-    def torque(self, step_index: int) -> float:
-        total = 0.0
-        for part in self._parts:
-            total += part.torque(step_index)
-        return total
-
-    def torques(self, steps: int) -> Torques:
+    def draw(self, block_index: int) -> Torques:
         import numpy as np
 
-        total = np.zeros(steps)
+        total = np.zeros(BLOCK_STEPS)
         for part in self._parts:
-            total += part.torques(steps)
+            total += part.draw(block_index)
         return total
 
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_sim.plant import PlantContext, held_command
+from plant_sim.plant import PlantContext, SteppedPlant
 
 Function = Callable[[float, NDArray[np.float64], NDArray[np.float64]], Any]
 
 
-class FunctionPlant:
+class FunctionPlant(SteppedPlant):
     """A `Plant` that does not change with time, from its `start` under `command`.
 
     `substeps` of Runge and Kutta (fourth order) make a step; 0: `dynamics` returns the state after it.
@@ -39,49 +39,41 @@ class FunctionPlant:
                 "transmitter.plant.mismatch is for plants with constants, and this one is a function; "
                 "change its own parameters"
             )
+        super().__init__(context, len(command) if noise is None else noise.shape[1])
         self._dynamics = dynamics
         self._output = output
         self._noise = noise
-        self._command_max = context.command_max
         self._substeps = substeps
         self._step_s = context.step_s / max(substeps, 1)
-        places = len(command) if noise is None else noise.shape[1]
-        self._disturbances = context.disturbances(places)
-        self._steps = 0
         self.state = np.array(start, dtype=float)
         self._held = np.array(command, dtype=float)
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The outputs, which follow from the state alone."""
         values = np.atleast_1d(np.asarray(self._output(0.0, self.state, self._held), dtype=float))
         return tuple(values.tolist())
 
-    def advance(self, command: tuple[float, ...]) -> None:
-        held = np.array(held_command(command, self._command_max))
-        self._held = held
-        push: NDArray[np.float64] | float = 0.0
-        if self._disturbances:
-            found = np.array([one.torque(self._steps) for one in self._disturbances])
-            if self._noise is None:
-                held = held + found
-            else:
-                push = self._noise @ found
-        self._steps += 1
-        if not self._substeps:
-            self.state = (
-                np.asarray(self._dynamics(0.0, self.state, held), dtype=float) + self._step_s * push
-            )
+    def _step(self, held: tuple[float, ...], push: tuple[float, ...]) -> None:
+        self._held = np.array(held)
+        u = self._held
+        pushed: NDArray[np.float64] = np.zeros_like(self.state)
+        if self._noise is None:
+            u = u + push
+        else:
+            pushed = self._noise @ push
+
+        def slope(x: NDArray[np.float64]) -> NDArray[np.float64]:
+            rates: NDArray[np.float64] = np.asarray(self._dynamics(0.0, x, u), dtype=float)
+            return rates + pushed
+
         h, half = self._step_s, 0.5 * self._step_s
+        if not self._substeps:
+            pushed = h * pushed
+            self.state = slope(self.state)
         for _ in range(self._substeps):
             x = self.state
-            k1 = self._slope(x, held, push)
-            k2 = self._slope(x + half * k1, held, push)
-            k3 = self._slope(x + half * k2, held, push)
-            k4 = self._slope(x + h * k3, held, push)
+            k1 = slope(x)
+            k2 = slope(x + half * k1)
+            k3 = slope(x + half * k2)
+            k4 = slope(x + h * k3)
             self.state = x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-
-    def _slope(
-        self, x: NDArray[np.float64], held: NDArray[np.float64], push: NDArray[np.float64] | float
-    ) -> NDArray[np.float64]:
-        return np.asarray(self._dynamics(0.0, x, held), dtype=float) + push

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import ClassVar, Final, TypeAlias
 
 
 def counts_of(
@@ -23,22 +23,6 @@ def angle_of(
 
 EXACT_PER_UNIT: Final = 2.0**40
 """Counts of an output that is read exactly; they only tell whether it moved."""
-
-
-class OutputReader(Protocol):
-    """The reader of one output of a plant."""
-
-    def counts(self, angle_rad: float, /) -> int:
-        """Return the count of a value; ValueError when it is not finite."""
-        ...
-
-    def read(self, value: float, /) -> tuple[int, float]:
-        """Return the count of a value, and the value that is made of it."""
-        ...
-
-    def angle_rad(self, counts: int, /) -> float:
-        """Return the value that counts stand for."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +55,13 @@ class Encoder:
         except (ValueError, OverflowError):
             raise ValueError(f"angle_rad is {angle_rad}; it must be finite") from None
 
+    @property
+    def step(self) -> float:
+        """Return how far the values that it shows lie apart."""
+        return self.turn / self.counts_per_turn
+
     def read(self, value: float) -> tuple[int, float]:
+        """Return the count of a value, and the value that is made of it."""
         count = self.counts(value)
         return count, self.angle_rad(count)
 
@@ -84,25 +74,13 @@ class Encoder:
 class ExactReader:
     """Reads a value as it is; its counts only tell whether the value moved."""
 
-    counts_per_unit: float = EXACT_PER_UNIT
-
-    def counts(self, value: float) -> int:
-        return math.floor(value * self.counts_per_unit)
+    step: ClassVar[float] = 0.0
 
     def read(self, value: float) -> tuple[int, float]:
-        return self.counts(value), value
-
-    def angle_rad(self, counts: int) -> float:
-        return counts / self.counts_per_unit
+        return math.floor(value * EXACT_PER_UNIT), value
 
 
-def angles_rad(encoders: tuple[OutputReader, ...], counts: tuple[int, ...]) -> tuple[float, ...]:
-    """Return the angles of several encoders from their counts, in the same order."""
-    return tuple(one.angle_rad(count) for one, count in zip(encoders, counts, strict=True))
-
-
-TEN_BITS: Final = Encoder(counts_per_turn=1024)
-"""The paper's: 10 bits a turn."""
+OutputReader: TypeAlias = Encoder | ExactReader
 
 QUANSER_PITCH: Final = Encoder(counts_per_turn=4096)
 """Pitch and elevation of a Quanser 3-DOF helicopter: 1024 lines, read in quadrature."""

@@ -6,7 +6,6 @@ that names one like one that names a class from outside.
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from weakref import finalize
 
-from plant_sim.plant import PlantContext
+from plant_sim.plant import PlantContext, held_command
 
 Names = Mapping[str, str]
 
@@ -68,15 +67,11 @@ class FmuPlant:
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The outputs after the last step, in the model's order and units."""
         return self._measured
 
     def advance(self, volts: tuple[float, ...]) -> None:
         """Hold a command, clamped, for one step; ValueError where the FMU refuses it."""
-        pairs = zip(volts, self._largest, strict=True)
-        if not all(map(math.isfinite, volts)):
-            raise ValueError(f"the command is {volts}; it must be finite")
-        self._write(self._inputs, [min(max(value, -most), most) for value, most in pairs])
+        self._write(self._inputs, list(held_command(volts, self._largest)))
         at_s = self._steps * self._step_s
         try:
             self._fmu.doStep(at_s, self._step_s)

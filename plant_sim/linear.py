@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_sim.disturbance import Pushes, pushes_of
-from plant_sim.plant import PlantContext, held_command
+from plant_sim.plant import PlantContext, SteppedPlant
 from plant_sim.zero_order_hold import Matrix, continuous, discretised
 
 Vector = tuple[float, ...]
@@ -54,7 +53,7 @@ def linear_output(state: Vector, constants: LinearStep, place: int) -> float:
     return total
 
 
-class SimulatedLinear:
+class SimulatedLinear(SteppedPlant):
     """A `Plant` of matrices: those of the codec's model, off by the mismatch, or those of its options.
 
     One mismatch is of every entry of A and B but those of rows like `angle' = rate`; three are of the
@@ -85,6 +84,7 @@ class SimulatedLinear:
         if not (model.get("A") and model.get("B")) and {"A", "B"} & options.keys():
             raise ValueError("the codec's model has no A and B; give both, or neither of them")
         F, E, noise = _stepped(model, context)
+        super().__init__(context, noise.shape[1])
         size, inputs = E.shape
         c = _matrix("C", model["C"], len(context.outputs) or None, size)
         at = _matrix("operating_state", model.get("operating_state") or [0.0] * size, 1, size)[0]
@@ -96,9 +96,6 @@ class SimulatedLinear:
             tuple((at - F @ at - E @ command).tolist()),
             _flat(c),
         )
-        self._command_max = context.command_max
-        self._disturbances = context.disturbances(noise.shape[1])
-        self._still = (0.0,) * noise.shape[1]
         self._outputs = range(len(c))
         begin = _matrix("start", [start or model.get("start") or at], 1, size)[0]
         if context.initial and not start:
@@ -106,22 +103,14 @@ class SimulatedLinear:
             begin = begin + np.linalg.pinv(rows) @ (np.array(context.initial) - rows @ begin)
         self.state: Vector = tuple(begin.tolist())
         self._rows = range(size)
-        self._steps = 0
 
     @property
     def measured(self) -> Vector:
         return tuple([linear_output(self.state, self.constants, place) for place in self._outputs])
 
-    def pushes(self, steps: int) -> Pushes:
-        return pushes_of(self._disturbances or (None,) * len(self._still), steps)
-
-    def advance(self, command: Vector) -> None:
-        held = held_command(command, self._command_max)
-        step = self._steps
-        push = tuple([one.torque(step) for one in self._disturbances]) or self._still
+    def _step(self, held: Vector, push: Vector) -> None:
         state, constants = self.state, self.constants
         self.state = tuple([linear_step(state, held, push, constants, row) for row in self._rows])
-        self._steps += 1
 
 
 def _stepped(model: Mapping[str, Any], context: PlantContext) -> tuple[Matrix, ...]:

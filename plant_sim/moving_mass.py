@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from plant_sim.disturbance import Torques
+from plant_sim.disturbance import BLOCK_STEPS, PlannedDisturbance, Torques
 
 SPEED_M_PER_S: Final = 0.08
 RANGE_M: Final = 0.1397
 """to either side of its home: the screw of Quanser's active disturbance system"""
 
 
-class MovingMass:
+class MovingMass(PlannedDisturbance):
     """The torque of a mass that is sent to positions, at home before the first.
 
     It moves at the speed of its screw. The arm is taken as level: within 30 degrees the torque is at
@@ -47,14 +47,9 @@ class MovingMass:
         self._times_s, self._places_m = times_s, places_m
         self._torque_per_m, self._step_s = torque_rad_per_s2_per_m, step_s
 
-    def torque(self, step_index: int) -> float:
-        return float(self._at(np.array([float(step_index)]))[0])
-
-    def torques(self, steps: int) -> Torques:
-        return self._at(np.arange(float(steps)))
-
-    def _at(self, indices: Torques) -> Torques:
-        places_m = np.interp(indices * self._step_s, self._times_s, self._places_m)
+    def draw(self, block_index: int) -> Torques:
+        times_s = np.arange(BLOCK_STEPS, dtype=float) + float(block_index * BLOCK_STEPS)
+        places_m = np.interp(times_s * self._step_s, self._times_s, self._places_m)
         return self._torque_per_m * places_m
 
 

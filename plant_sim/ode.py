@@ -12,8 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from plant_sim.disturbance import Pushes, pushes_of
-from plant_sim.plant import PlantContext, held_command
+from plant_sim.plant import PlantContext, SteppedPlant
 
 Vector = tuple[float, ...]
 Sine = Callable[[float], float]
@@ -85,7 +84,7 @@ def _averaged(
     return state[index] + sixth * (k1[index] + 2.0 * (k2[index] + k3[index]) + k4[index])
 
 
-class OdePlant:
+class OdePlant(SteppedPlant):
     """A `Plant` of equations; its outputs are the first of its states.
 
     A held command reaches the equations through the motors' lag, which is exact. Motors start with the
@@ -104,6 +103,7 @@ class OdePlant:
         motor_lag_s: float = 0.0,
         resting: Vector = (),
     ) -> None:
+        super().__init__(context, places)
         require_at_least_zero(motor_lag_s=motor_lag_s)
         self.slopes, self.constants = slopes, constants
         self.state: Vector = tuple(map(float, start))
@@ -113,28 +113,17 @@ class OdePlant:
             for share in (0.5, 1.0)
         ]
         self.step_constants = OdeConstants(constants, context.step_s, *left)
-        self._command_max = context.command_max
-        self._disturbances = context.disturbances(places)
-        self._still = (0.0,) * places
         self._sine = context.sine
         self._outputs = outputs
-        self._steps = 0
 
     @property
     def measured(self) -> Vector:
         return self.state[: self._outputs]
 
-    def advance(self, command: Vector) -> None:
-        held = held_command(command, self._command_max)
-        step = self._steps
-        push = tuple([one.torque(step) for one in self._disturbances]) or self._still
-        self._steps += 1
+    def _step(self, held: Vector, push: Vector) -> None:
         self.state, self.motors = ode_step(
             self.slopes, (self.state, self.motors), held, push, self.step_constants, self._sine
         )
-
-    def pushes(self, steps: int) -> Pushes:
-        return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
 
 def rub(rate: float, friction: float, slow: float) -> float:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from plant_sim.disturbance import Disturbance, PlannedDisturbance
+    from plant_sim.disturbance import Disturbance, PlannedDisturbance, Pushes
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,3 +86,30 @@ def held_command(command: Sequence[float], largest: Sequence[float]) -> tuple[fl
     if not all(map(math.isfinite, command)):
         raise ValueError(f"the command is {tuple(command)}; it must be finite")
     return tuple([min(max(one, -most), most) for one, most in zip(command, largest, strict=True)])
+
+
+class SteppedPlant(ABC):
+    """The common part of plants: commands within their limits, and the disturbances of a step."""
+
+    def __init__(self, context: PlantContext, places: int) -> None:
+        """Take the disturbances of `places` places of the plant."""
+        self._command_max = context.command_max
+        self._disturbances = context.disturbances(places)
+        self._still = (0.0,) * places
+        self._steps = 0
+
+    def pushes(self, steps: int) -> Pushes:
+        """Return the disturbance of the first steps, a column per place."""
+        from plant_sim.disturbance import pushes_of
+
+        return pushes_of(self._disturbances or (None,) * len(self._still), steps)
+
+    def advance(self, command: tuple[float, ...]) -> None:
+        held = held_command(command, self._command_max)
+        push = tuple([one.torque(self._steps) for one in self._disturbances]) or self._still
+        self._steps += 1
+        self._step(held, push)
+
+    @abstractmethod
+    def _step(self, held: tuple[float, ...], push: tuple[float, ...]) -> None:
+        """Advance by a step of a held command and held disturbances."""

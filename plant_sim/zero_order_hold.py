@@ -1,9 +1,11 @@
-"""A linear plant between two ticks: its discretisation under a held command, and the inverse.
+"""A plant's linearisation; a linear plant's discretisation under a held command, and the inverse.
 
 dx/dt = A x + B u   and   x[n+1] = F x[n] + E u[n]
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -41,3 +43,26 @@ def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Mat
         )
     found = grown.real / period_s
     return found[:states, :states], found[:states, states:]
+
+
+def van_loan(dynamics: Matrix, noise: Matrix, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
+    states = len(dynamics)
+    block = np.zeros((2 * states, 2 * states))
+    block[:states, :states] = -dynamics
+    block[:states, states:] = noise
+    block[states:, states:] = dynamics.T
+    exponential = scipy.linalg.expm(block * period_s)
+    transition = exponential[states:, states:].T
+    covariance = transition @ exponential[:states, states:]
+    return transition, 0.5 * (covariance + covariance.T)
+
+
+def differences(function: Callable[[Matrix], Matrix], at: Matrix, steps: Matrix) -> Matrix:
+    """Return the derivatives of a vector by central differences, a column for each entry of `at`."""
+    columns = []
+    for index, step in enumerate(steps):
+        moved = np.zeros_like(at)
+        moved[index] = step
+        columns.append((function(at + moved) - function(at - moved)) / (2.0 * step))
+    return np.stack(columns, axis=1)

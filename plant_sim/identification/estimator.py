@@ -20,6 +20,7 @@ Gamma (sum of blocks squared) Gamma.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,29 +94,23 @@ class Estimate:
     target: float
     """root mean square of xi"""
 
-    @property
-    def deviations(self) -> Array:
-        """Return the standard errors."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
-
 
 def estimate(
     moments: Moments,
     *,
     forgetting_per_s: float = 0.01,
     gain: float | None = 1e3,
-    gain_bound: float | None = None,
     memory_s: float = 6.0,
     shown: int | None = None,
-    constant: int | None = None,
+    constants: Sequence[int] = (),
 ) -> Estimate:
     """Run (9), (10) over all blocks.
 
     `forgetting_per_s` is alpha, `gain` the diagonal of Gamma(0) (None: large, by the size of each
-    regressor), `gain_bound` what the norm of Gamma may not exceed (ten times Gamma(0) if not given),
-    `memory_s` longer than the noise's memory. The first `shown` parameters count for the condition;
-    the others describe how the record begins. `constant` is the regressor that is always 1: what it
-    explains of the others does not tell them apart, and does not make them alike.
+    regressor); the norm of Gamma may not exceed ten times that of Gamma(0). `memory_s` is longer than
+    the noise's memory. The first `shown` parameters count for the condition; the others describe how
+    the record begins. `constants` are the regressors that are always 1: what they explain of the
+    others does not tell them apart, and does not make them alike.
     """
     if not 0.0 <= forgetting_per_s < math.inf:
         raise IdentificationError(f"forgetting_per_s is {forgetting_per_s}; it must be at least 0")
@@ -128,10 +123,7 @@ def estimate(
         if not (math.isfinite(gain) and gain > 0.0):
             raise IdentificationError(f"gain is {gain}; it must be finite and above 0")
         start = np.full(size, 1.0 / gain)
-    norm = float(np.sqrt(np.sum(start**-2.0)))
-    bound = 10.0 * norm if gain_bound is None else gain_bound
-    if bound < norm:
-        raise IdentificationError(f"gain_bound is {bound:g}, below Gamma(0) itself; raise it")
+    bound = 10.0 * float(np.sqrt(np.sum(start**-2.0)))
     information, product = np.diag(start), np.zeros(size)
     inverse = np.diag(1.0 / start)
     history = np.empty((len(moments.products), size))
@@ -159,7 +151,7 @@ def estimate(
         values,
         covariance,
         levels,
-        _condition(summed[:shown, :shown] / remembered, constant),
+        condition_of(summed[:shown, :shown] / remembered, constants),
         math.sqrt(max(0.0, float(weights @ errors)) / remembered),
         math.sqrt(float(weights @ moments.targets) / remembered),
     )
@@ -181,14 +173,18 @@ def _covariance(
     return np.asarray(inverse @ (blocks.T @ blocks) @ inverse * (whole / free))
 
 
-def _condition(mean: Array, constant: int | None) -> float:
-    """Return the smallest eigenvalue of a correlation matrix; 0 when a regressor is missing."""
-    power = np.diag(mean)
-    if constant is not None:
-        mean = mean - np.outer(mean[constant], mean[constant]) / mean[constant, constant]
-        mean, power = (np.delete(one, constant, axis=0) for one in (mean, power))
-        mean = np.delete(mean, constant, axis=1)
-    levels = np.sqrt(np.maximum(np.diag(mean), 0.0))
+def condition_of(squares: Array, constants: Sequence[int] = ()) -> float:
+    """Return the smallest eigenvalue of the correlation of regressors; 0 when one is missing.
+
+    `squares` are their sums of products. What the constant ones explain of the others is left out.
+    """
+    shown = [place for place in range(len(squares)) if place not in constants]
+    own = squares[np.ix_(shown, shown)]
+    power = np.diag(own)
+    if constants:
+        across = squares[np.ix_(shown, constants)]
+        own = own - across @ np.linalg.pinv(squares[np.ix_(constants, constants)]) @ across.T
+    levels = np.sqrt(np.maximum(np.diag(own), 0.0))
     if not np.all(levels**2 > 1e-12 * power):
         return 0.0
-    return float(max(0.0, np.linalg.eigvalsh(mean / np.outer(levels, levels))[0]))
+    return float(max(0.0, np.linalg.eigvalsh(own / np.outer(levels, levels))[0]))

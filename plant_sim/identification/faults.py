@@ -8,9 +8,8 @@ import numpy as np
 from scipy.signal import detrend, welch
 
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
-from plant_sim.identification.structures import Structure
+from plant_sim.identification.structures import PitchStructure, Structure
 
 VOLTS_MAX = 60.0
 COUNTS = (360, 400, 500, 512, 720, 1000, 1440, 2000, 2500, 3600, 4000, 5000, 8000, 10_000, 20_000)

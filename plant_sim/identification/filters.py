@@ -24,27 +24,6 @@ from plant_sim.identification.errors import IdentificationError
 Array = NDArray[np.float64]
 
 
-def require_hurwitz(polynomial: Sequence[float]) -> tuple[float, ...]:
-    """Return (1, d_1, ..., d_n); IdentificationError unless every root has a negative real part."""
-    coefficients = tuple(float(value) for value in polynomial)
-    if len(coefficients) < 2 or not np.all(np.isfinite(coefficients)):
-        raise IdentificationError(
-            f"the filter polynomial {coefficients} needs at least two finite coefficients, the "
-            "highest power first"
-        )
-    if coefficients[0] != 1.0:
-        raise IdentificationError(
-            f"the filter polynomial {coefficients} must begin with 1: divide it by {coefficients[0]:g}"
-        )
-    worst = max(np.roots(coefficients).real)
-    if worst >= 0.0:
-        raise IdentificationError(
-            f"the filter polynomial {coefficients} is not Hurwitz: it has a root with real part "
-            f"{worst:.3g}, so the filter would not settle; choose one with all roots left of zero"
-        )
-    return coefficients
-
-
 def low_pass(order: int, bandwidth_rad_s: float, damping: float) -> tuple[float, ...]:
     """Return D(p): p^2 + 2 rho w_f p + w_f^2 of (13)-(15), or a Butterworth filter of another order."""
     if not (bandwidth_rad_s > 0.0 and damping > 0.0):
@@ -53,8 +32,8 @@ def low_pass(order: int, bandwidth_rad_s: float, damping: float) -> tuple[float,
             "0, or the state filters do not settle"
         )
     if order == 2:
-        return require_hurwitz((1.0, 2.0 * damping * bandwidth_rad_s, bandwidth_rad_s**2))
-    return require_hurwitz(butter(order, bandwidth_rad_s, analog=True)[1].tolist())
+        return 1.0, 2.0 * damping * bandwidth_rad_s, bandwidth_rad_s**2
+    return tuple(butter(order, bandwidth_rad_s, analog=True)[1].tolist())
 
 
 @dataclass(slots=True)
@@ -76,7 +55,7 @@ class SignalFilter:
 
     def __post_init__(self) -> None:
         """Discretise the filter exactly."""
-        coefficients = require_hurwitz(self.polynomial)
+        coefficients = self.polynomial
         order = len(coefficients) - 1
         lagging = 1 if self.held and self.lag_s > 0.0 else 0
         size = order + lagging

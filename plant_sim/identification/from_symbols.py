@@ -14,13 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_sim.identification.estimator import Estimate
+from plant_sim.identification.estimator import Estimate, condition_of
 from plant_sim.identification.filters import Array
 from plant_sim.identification.maximum import Maximum, climb
 from plant_sim.identification.pipeline import Identification, doubts, uncertain
-from plant_sim.identification.pitch import PitchStructure
-from plant_sim.identification.regression import Filters, Regression
-from plant_sim.identification.structures import Structure, holding, names_of
+from plant_sim.identification.regression import Filters, Regression, constants_of
+from plant_sim.identification.structures import PitchStructure, Structure, names_of
 from plant_sim.identification.symbols import Likelihood, Symbols, likelihood
 
 GUESSED = -math.log(2.0)
@@ -69,12 +68,11 @@ def identify_symbols(
     notes = []
     values, covariance = _estimate(found, structure)
     spread = math.sqrt(max(0.0, covariance[0, 0]))
-    damped = isinstance(structure, PitchStructure) and "a_w" in values
-    if damped and -3.0 * spread < values["a_w"] < 0.0:
+    if isinstance(structure, PitchStructure) and -3.0 * spread < values.get("a_w", 0.0) < 0.0:
         notes.append(
             f"a_w = {values['a_w']:.2g} +- {spread:.2g} is 0 within its uncertainty: held at 0"
         )
-        structure = holding(structure, {"a_w"})
+        structure = replace(structure, damped=False)
         chance = replace(chance, structure=structure)
         found = climb(chance, found.point[1:], scale[1:])
         values, covariance = _estimate(found, structure)
@@ -100,18 +98,14 @@ def levels_of(chance: Likelihood, values: Mapping[str, float], states: Array) ->
     outputs = states[:, ::order]
     signals = structure.signals(outputs)
     acting = chance.drives.reshape(len(states), chance.steps, -1).mean(axis=1)
-    count = signals.shape[1]
+    columns = np.hstack((signals, acting, np.ones((len(states), 1))))
     terms, targets = {}, []
     for equation in structure.equations:
         total = np.zeros(len(states))
         for term in equation.terms:
-            if term.signal < count:
-                place = term.signal * order + term.derivative
-                column = states[:, place] if term.derivative else signals[:, term.signal]
-            elif term.signal < count + acting.shape[1]:
-                column = acting[:, term.signal - count]
-            else:
-                column = np.ones(len(states))
+            column = columns[:, term.signal]
+            if term.derivative:
+                column = states[:, term.signal * order + term.derivative]
             terms[term.name] = float(np.sqrt(np.mean(column**2)))
             total += term.sign * values.get(term.name, 0.0) * column
         targets.append(float(np.sqrt(np.mean(total**2))))
@@ -160,23 +154,9 @@ def _parameters_covariance(information: Array, count: int) -> Array:
     kept = np.diag(others) > 1e-9
     across = information[:count, count:][:, kept]
     own = own - across @ np.linalg.solve(others[np.ix_(kept, kept)], across.T) if kept.any() else own
-    size = np.sqrt(np.maximum(np.diag(own), 0.0))
-    if not np.all(size > 0.0) or np.linalg.eigvalsh(own / np.outer(size, size))[0] < 1e-12:
+    if condition_of(own) < 1e-12:
         return np.diag(np.full(count, math.inf))
     return np.asarray(np.linalg.inv(own))
-
-
-def _condition(information: Array, constants: list[int]) -> float:
-    """Return the smallest eigenvalue of the correlation of all but the constants."""
-    shown = [place for place in range(len(information)) if place not in constants]
-    own = information[np.ix_(shown, shown)]
-    if constants:
-        across = information[np.ix_(shown, constants)]
-        own = own - across @ np.linalg.pinv(information[np.ix_(constants, constants)]) @ across.T
-    size = np.sqrt(np.maximum(np.diag(own), 0.0))
-    if not np.all(size > 0.0):
-        return 0.0
-    return float(max(0.0, np.linalg.eigvalsh(own / np.outer(size, size))[0]))
 
 
 def _history(
@@ -198,19 +178,17 @@ def _history(
         aim = sums @ last + pulled + weak @ before
         history[row] = np.linalg.lstsq(sums + weak, aim, rcond=None)[0]
     covariance = _parameters_covariance(found.information, count)
-    signals = structure.signals(np.zeros((1, len(structure.equations)))).shape[1]
-    constant = signals + chance.drives.shape[1]
     estimates, first = [], 0
     for equation, target in zip(structure.equations, levels.targets, strict=True):
         own = slice(first, first + len(equation.terms))
-        constants = [place for place, term in enumerate(equation.terms) if term.signal == constant]
+        constants = constants_of(structure, equation, chance.drives.shape[1])
         estimates.append(
             Estimate(
                 history[:, own],
                 last[own],
                 covariance[own, own],
                 np.array([levels.terms[term.name] for term in equation.terms]),
-                _condition(found.information[own, own], constants),
+                condition_of(found.information[own, own], constants),
                 0.0,
                 target,
             )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant_sim.identification.filters import Array
+from plant_sim.zero_order_hold import differences
 
 Function = Callable[[Array], tuple[Array, Array]]
 """point -> log-likelihood of each sample, and what belongs to it"""
@@ -67,9 +68,4 @@ def climb(function: Function, start: Array, scale: Array) -> Maximum:
 
 
 def _scores(function: Function, point: Array, nudge: Array) -> Array:
-    columns = []
-    for index in range(len(point)):
-        moved = np.zeros_like(point)
-        moved[index] = nudge[index]
-        columns.append((function(point + moved)[0] - function(point - moved)[0]) / (2.0 * nudge[index]))
-    return np.stack(columns, axis=1)
+    return differences(lambda moved: function(moved)[0], point, nudge)

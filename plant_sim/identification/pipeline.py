@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import TypeGuard
 
 import numpy as np
 
@@ -18,16 +19,15 @@ from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import CONDITION_MIN
 from plant_sim.identification.faults import dominant_rad_s, require_motion
 from plant_sim.identification.filters import Array
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
 from plant_sim.identification.simulation import Segments, SimulationFit
 from plant_sim.identification.structures import (
     LinearStructure,
     Parameter,
+    PitchStructure,
     Structure,
     gains_of,
-    holding,
     names_of,
 )
 
@@ -48,17 +48,17 @@ COARSE = 100
 """blocks of a regression of which only the last estimate counts"""
 
 
+OF_A_LOG = Filters(forgetting_per_s=0.0, gain=None, rests=False)
+
+
 @dataclass(frozen=True, slots=True)
 class Options:
     """The options of an identification; None: found from the data."""
 
     lag_s: float | None = None
     bandwidth_rad_s: float | None = None
-    damping: float = 0.7
-    forgetting_per_s: float = 0.0
-    gain: float | None = None
-    rests: bool = False
-    """the record begins at rest with its inputs at 0"""
+    filters: Filters = OF_A_LOG
+    """the rest of their constants"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,6 @@ class Identification:
     parameters: tuple[Parameter, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Name the parameters."""
         found = self.structure.parameters(self.values, self.covariance)
         object.__setattr__(self, "parameters", tuple(found))
 
@@ -103,14 +102,7 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
         )
     notes: list[str] = []
     bandwidth = _bandwidth(record, structure, options, notes)
-    filters = Filters(
-        bandwidth,
-        options.damping,
-        options.forgetting_per_s,
-        options.gain,
-        options.lag_s or 0.0,
-        options.rests,
-    )
+    filters = replace(options.filters, bandwidth_rad_s=bandwidth, lag_s=options.lag_s or 0.0)
     warnings: list[str] = []
     segments: Segments | None = None
     check: SimulationFit | None = None
@@ -124,7 +116,7 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
     if check is not None and segments is not None and _is_zero(structure, values, covariance):
         value, deviation = values["a_w"], math.sqrt(covariance[0, 0])
         notes.append(f"a_w = {value:.2g} +- {deviation:.2g} is 0 within its uncertainty: held at 0")
-        structure = holding(structure, {"a_w"})
+        structure = replace(structure, damped=False)
         start = {name: check.values[name] for name in names_of(structure)}
         fitted = simulation.fit(segments, structure, start, check.lag_s)
         check = replace(fitted, lag_deviation_s=check.lag_deviation_s)
@@ -213,7 +205,9 @@ def _simulated(
     return best
 
 
-def _is_zero(structure: Structure, values: dict[str, float], covariance: Array) -> bool:
+def _is_zero(
+    structure: Structure, values: dict[str, float], covariance: Array
+) -> TypeGuard[PitchStructure]:
     """Return whether a damping is negative, and 0 within its uncertainty."""
     if not isinstance(structure, PitchStructure) or values.get("a_w", 0.0) >= 0.0:
         return False

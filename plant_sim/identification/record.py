@@ -51,7 +51,6 @@ class Record:
                 raise IdentificationError(f"the {names[column]} of sample {row} is not finite")
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return len(self.outputs)
 
     @property

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import (
@@ -19,7 +20,7 @@ from plant_sim.identification.estimator import (
 )
 from plant_sim.identification.filters import Array, SignalFilter, low_pass
 from plant_sim.identification.record import Record
-from plant_sim.identification.structures import Equation, Structure
+from plant_sim.identification.structures import Equation, Structure, functions_of
 
 MEMORY = 3.0
 """of the filters, over their bandwidth"""
@@ -60,7 +61,6 @@ class Regression:
 
     @property
     def values(self) -> dict[str, float]:
-        """Return the parameters by name."""
         return self._named([one.values for one in self.estimates])
 
     def values_at(self, row: int) -> dict[str, float]:
@@ -77,13 +77,9 @@ class Regression:
     @property
     def covariance(self) -> Array:
         """Return the parameters' covariance; those of different equations are taken apart."""
-        counts = [len(equation.terms) for equation in self.structure.equations]
-        whole = np.zeros((sum(counts), sum(counts)))
-        first = 0
-        for count, one in zip(counts, self.estimates, strict=True):
-            whole[first : first + count, first : first + count] = one.covariance[:count, :count]
-            first += count
-        return whole
+        pairs = zip(self.structure.equations, self.estimates, strict=True)
+        counted = [(len(equation.terms), one.covariance) for equation, one in pairs]
+        return np.asarray(block_diag(*[whole[:count, :count] for count, whole in counted]))
 
     @property
     def condition(self) -> float:
@@ -119,7 +115,7 @@ def regress(
             gain=filters.gain,
             memory_s=MEMORY / filters.bandwidth_rad_s,
             shown=len(equation.terms),
-            constant=_constant(record, structure, equation),
+            constants=constants_of(structure, equation, structure.acting(record.inputs[:1]).shape[1]),
         )
         for equation, pieces in zip(structure.equations, sums, strict=True)
     )
@@ -133,13 +129,10 @@ def regress(
 Columns = Mapping[tuple[int, int], Array]
 
 
-def _constant(record: Record, structure: Structure, equation: Equation) -> int | None:
-    """Return which of an equation's regressors is the constant 1."""
-    signal = (
-        structure.signals(record.outputs[:1]).shape[1] + structure.acting(record.inputs[:1]).shape[1]
-    )
-    places = [place for place, term in enumerate(equation.terms) if term.signal == signal]
-    return places[0] if places else None
+def constants_of(structure: Structure, equation: Equation, inputs: int) -> list[int]:
+    """Return which of an equation's regressors are the constant 1."""
+    signal = functions_of(structure) + inputs
+    return [place for place, term in enumerate(equation.terms) if term.signal == signal]
 
 
 def _rows(equation: Equation, columns: Columns, modes: list[Array]) -> tuple[Array, Array]:

@@ -19,9 +19,8 @@ from scipy.optimize import least_squares
 
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.filters import Array, lagged
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
-from plant_sim.identification.structures import LinearStructure, Structure, names_of
+from plant_sim.identification.structures import LinearStructure, PitchStructure, Structure, names_of
 
 SEGMENT_S = 5.0
 SEGMENTS_MIN = 4

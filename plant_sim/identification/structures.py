@@ -6,10 +6,11 @@ signal. The signals are functions of the outputs, then the inputs, then the cons
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, TypeVar
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from plant_sim.identification.filters import Array
 
 GRAMMAR = "pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear"
 ORDER_MAX = 4
+COSINE, SINE = "a_th cos(theta_0)", "a_th sin(theta_0)"
 
 
 class Term(NamedTuple):
@@ -57,66 +59,6 @@ class StateSpace(NamedTuple):
     states: tuple[str, ...]
 
 
-class Structure(Protocol):
-    """The equations of a model, and the meaning of its parameters."""
-
-    @property
-    def kind(self) -> str:
-        """Return its name, as the command line takes it."""
-        ...
-
-    @property
-    def order(self) -> int:
-        """Return the highest derivative, which the state filters must reach."""
-        ...
-
-    @property
-    def equations(self) -> tuple[Equation, ...]:
-        """Return one equation for each output."""
-        ...
-
-    @property
-    def without(self) -> frozenset[str]:
-        """Return the parameters that are held at 0."""
-        ...
-
-    def signals(self, outputs: Array) -> Array:
-        """Return the functions of the outputs."""
-        ...
-
-    def acting(self, inputs: Array) -> Array:
-        """Return the inputs of the equations."""
-        ...
-
-    def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
-        """Return the reported values, those held at 0 included."""
-        ...
-
-
-Held = TypeVar("Held", bound="Structure")
-
-
-def holding(structure: Held, names: set[str]) -> Held:
-    """Return a structure with more parameters held at 0."""
-    return replace(structure, without=structure.without | names)  # type: ignore[type-var]
-
-
-def names_of(structure: Structure) -> tuple[str, ...]:
-    """Return the names of all parameters, equation by equation."""
-    return tuple(term.name for equation in structure.equations for term in equation.terms)
-
-
-def gains_of(structure: Structure, inputs: int) -> set[str]:
-    """Return the names of the parameters that an input acts through."""
-    first = structure.signals(np.zeros((1, len(structure.equations)))).shape[1]
-    return {
-        term.name
-        for equation in structure.equations
-        for term in equation.terms
-        if first <= term.signal < first + inputs
-    }
-
-
 @dataclass(frozen=True)
 class LinearStructure:
     """Any linear structure: `orders` of the equations, `input_order` of the input's derivatives.
@@ -133,7 +75,6 @@ class LinearStructure:
     integrates: bool = False
     """the outputs' own terms are 0"""
     coupled: bool = False
-    without: frozenset[str] = frozenset()
 
     @property
     def order(self) -> int:
@@ -142,7 +83,6 @@ class LinearStructure:
 
     @property
     def equations(self) -> tuple[Equation, ...]:
-        """Return one equation for each output."""
         return tuple(self._equation(index) for index in range(len(self.outputs)))
 
     def _equation(self, output: int) -> Equation:
@@ -159,8 +99,7 @@ class LinearStructure:
                 for derivative in range(self.input_order, -1, -1)
             ]
         terms.append(Term(self._offset(output), constant, 0))
-        kept = tuple(term for term in terms if term.name not in self.without)
-        return Equation(output, self.n, kept)
+        return Equation(output, self.n, tuple(terms))
 
     def _own(self, output: int, other: int, derivative: int) -> str:
         if not self.coupled:
@@ -179,19 +118,16 @@ class LinearStructure:
         return f"{self.outputs[output]}''/1" if self.coupled else "d"
 
     def signals(self, outputs: Array) -> Array:
-        """Return the outputs themselves."""
         return outputs
 
     def acting(self, inputs: Array) -> Array:
-        """Return the inputs themselves."""
         return inputs
 
     def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
-        """Return the parameters by their names."""
         spread = dict(zip(values, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
-        whole = names_of(replace(self, without=frozenset()))
         return [
-            Parameter(name, name, "", values.get(name, 0.0), spread.get(name, 0.0)) for name in whole
+            Parameter(name, name, "", values.get(name, 0.0), spread.get(name, 0.0))
+            for name in names_of(self)
         ]
 
     def state_space(self, values: Mapping[str, float]) -> StateSpace:
@@ -227,6 +163,112 @@ class LinearStructure:
                 for place in range(n)
             ]
         return StateSpace(A, B, C, offset, tuple(states))
+
+
+@dataclass(frozen=True)
+class PitchStructure:
+    """The pitch model (11), (12).
+
+    theta'' = -a_w theta' - a_th sin(theta - theta_0) + k_v mu                       (11)
+    T_m vbar_i' + vbar_i = v_i,   mu = vbar_front - vbar_rear                        (12)
+
+    The bias `equilibrium_rad`, theta_0, is measured beforehand, or None. Where it is not to be trusted
+    (a body leaning on something on the ground), it is estimated with the others:
+    a_th sin(theta - theta_0) = c sin(theta) - d cos(theta) is linear in c = a_th cos(theta_0) and
+    d = a_th sin(theta_0).
+    """
+
+    equilibrium_rad: float | None = None
+    volts_max: float = math.inf
+    """where each motor saturates: commands beyond it have no further effect"""
+    damped: bool = True
+    """False: a_w is held at 0"""
+
+    kind = "pitch"
+    order = 2
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Return (11)."""
+        pulls: tuple[Term, ...] = (Term("a_th", 1, 0, -1.0),)
+        if self.equilibrium_rad is None:
+            pulls = (Term(COSINE, 1, 0, -1.0), Term(SINE, 2, 0))
+        damping = (Term("a_w", 0, 1, -1.0),) if self.damped else ()
+        return (Equation(0, 2, (*damping, *pulls, Term("k_v", 1 + len(pulls), 0))),)
+
+    def signals(self, outputs: Array) -> Array:
+        """Return theta and sin(theta - theta_0), or theta, its sine and its cosine."""
+        angle = outputs[:, :1]
+        if self.equilibrium_rad is not None:
+            return np.hstack((angle, np.sin(angle - self.equilibrium_rad)))
+        return np.hstack((angle, np.sin(angle), np.cos(angle)))
+
+    def acting(self, inputs: Array) -> Array:
+        """Return v_front - v_rear, each as far as its motor follows; a single input is v_front."""
+        volts = np.clip(inputs, -self.volts_max, self.volts_max)
+        return volts[:, :1] - volts[:, 1:2] if inputs.shape[1] > 1 else volts
+
+    def constants(self, values: Mapping[str, float]) -> tuple[float, float, float, float]:
+        """Return a_w, a_th, k_v and theta_0."""
+        damping, gain = values.get("a_w", 0.0), values.get("k_v", 0.0)
+        if self.equilibrium_rad is not None:
+            return damping, values.get("a_th", 0.0), gain, self.equilibrium_rad
+        cosine, sine = values.get(COSINE, 0.0), values.get(SINE, 0.0)
+        return damping, math.hypot(cosine, sine), gain, math.atan2(sine, cosine)
+
+    def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
+        """Return the fields of the model's section; 0 is the error of a theta_0 that was given."""
+        found = self.constants(values)
+        order = list(values)
+        turn = np.zeros((4, len(order)))
+        for row, name in ((0, "a_w"), (1, "a_th"), (2, "k_v")):
+            if name in values:
+                turn[row, order.index(name)] = 1.0
+        if self.equilibrium_rad is None and COSINE in values:
+            # To first order, by the derivatives of size and angle.
+            stiffness, angle = max(found[1], 1e-12), found[3]
+            for name, along, across in (
+                (COSINE, math.cos(angle), -math.sin(angle)),
+                (SINE, math.sin(angle), math.cos(angle)),
+            ):
+                turn[1, order.index(name)], turn[3, order.index(name)] = along, across / stiffness
+        with np.errstate(invalid="ignore"):
+            spread = np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
+        spread = np.where(np.isnan(spread), math.inf, spread)
+        fields = (
+            ("rate_damping_per_s", "a_w", "1/s"),
+            ("stiffness_per_s2", "a_th", "1/s^2"),
+            ("torque_gain_rad_per_v_s2", "k_v", "rad/(V s^2)"),
+            ("equilibrium_rad", "theta_0", "rad"),
+        )
+        return [
+            Parameter(*field, value, float(deviation))
+            for field, value, deviation in zip(fields, found, spread, strict=True)
+        ]
+
+
+Structure: TypeAlias = PitchStructure | LinearStructure
+
+
+def names_of(structure: Structure) -> tuple[str, ...]:
+    """Return the names of all parameters, equation by equation."""
+    return tuple(term.name for equation in structure.equations for term in equation.terms)
+
+
+def functions_of(structure: Structure) -> int:
+    """Return how many functions of the outputs there are: the first of the signals."""
+    return int(structure.signals(np.zeros((1, len(structure.equations)))).shape[1])
+
+
+def gains_of(structure: Structure, inputs: int) -> set[str]:
+    """Return the names of the parameters that an input acts through."""
+    first = functions_of(structure)
+    return {
+        term.name
+        for equation in structure.equations
+        for term in equation.terms
+        if first <= term.signal < first + inputs
+    }
 
 
 def parse_linear(text: str, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearStructure:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from plant_sim.identification.filters import Array, lagged
-from plant_sim.identification.pitch import PitchStructure
-from plant_sim.identification.structures import LinearStructure, Structure, names_of
+from plant_sim.identification.structures import LinearStructure, PitchStructure, Structure, names_of
+from plant_sim.zero_order_hold import van_loan
 
 STEP_MAX = 0.3
 """of a Runge-Kutta step, over the time constant of the fastest motion"""
@@ -47,7 +47,6 @@ class Symbols:
     """symbols of two values; all those of a word may make one statement"""
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return len(self.firsts) - 1
 
     @property
@@ -82,7 +81,6 @@ class Likelihood:
     drives: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        """Average the inputs over each step."""
         symbols = self.symbols
         acting = averaged(self.structure.acting(symbols.inputs), symbols.tick_s, self.lag_s)
         rows = acting.reshape(len(symbols) * self.steps, -1, acting.shape[1]).mean(axis=1)
@@ -103,7 +101,7 @@ class Likelihood:
         given = (symbols.firsts, symbols.combinations, symbols.lows, symbols.highs, symbols.spreads)
         start = (symbols.start.copy(), np.diag(symbols.start_deviations**2))
         drive = np.ascontiguousarray(self.drives @ B.T + force)
-        added = _spread(A, noise, step_s)
+        _, added = van_loan(A, noise, step_s)
         work = np.zeros((6, size, size))
         self.function(A, sine, drive, added, step_s, *given, wrong, *start, work, logs, means)
         return logs, means
@@ -134,15 +132,3 @@ def likelihood(
     least = max(2.0, symbols.period_s * fastest / STEP_MAX)
     whole = [count for count in range(1, ticks + 1) if ticks % count == 0 and count >= least]
     return Likelihood(symbols, structure, lag_s, whole[0] if whole else ticks, function)
-
-
-def _spread(A: Array, noise: Array, step_s: float) -> Array:
-    """Return the covariance that white noise adds in a step, by Gauss' rule of three points."""
-    total = np.zeros_like(noise)
-    for at, weight in ((-math.sqrt(0.6), 5.0), (0.0, 8.0), (math.sqrt(0.6), 5.0)):
-        step = A * (0.5 * step_s * (1.0 + at))
-        turned = np.eye(len(A))
-        for order in range(5, 0, -1):
-            turned = np.eye(len(A)) + step @ turned / order
-        total += weight / 18.0 * step_s * turned @ noise @ turned.T
-    return total

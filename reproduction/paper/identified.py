@@ -9,9 +9,9 @@ import numpy as np
 
 from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.pipeline import Options
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.structures import PitchStructure
 from plant_sim.pitch import PitchPlant
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import load_config
@@ -45,13 +45,7 @@ class Trials:
 
 def clean_trial(excitation: str) -> Identified:
     """Run one experiment without noise, on the simulated rig with a ten-bit encoder."""
-    options = Options(
-        MOTOR_LAG_S,
-        PAPER_FILTERS.bandwidth_rad_s,
-        forgetting_per_s=PAPER_FILTERS.forgetting_per_s,
-        gain=PAPER_FILTERS.gain,
-        rests=True,
-    )
+    options = Options(MOTOR_LAG_S, PAPER_FILTERS.bandwidth_rad_s, PAPER_FILTERS)
     return run(excitation, record_of(excitation, CLEAN_S), Wanted(equilibrium="quiet", options=options))
 
 

@@ -18,9 +18,8 @@ import numpy as np
 
 from plant_sim.identification import simulation
 from plant_sim.identification.pipeline import Options, identify
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.regression import regress
-from plant_sim.identification.structures import holding
+from plant_sim.identification.structures import PitchStructure
 from reproduction.paper.flights import Job, Overrides
 from reproduction.paper.identified import MOTOR_LAG_S
 from tenbaud.config.load import load_config
@@ -65,7 +64,7 @@ def identify_first_half(data: Path) -> FirstHalf:
     record, _ = from_log(load_config("uiuc-10baud", None, {"flight_log": log}))
     options = Options(MOTOR_LAG_S, BANDWIDTH_RAD_S)
     whole = identify(record, PitchStructure(), options)
-    structure = holding(PitchStructure(), {"a_w"})
+    structure = PitchStructure(damped=False)
     segments = simulation.cut(record, structure, SEGMENT_S)
     start = regress(record, structure, whole.regression.filters)
     fitted = simulation.fit(segments, structure, start.values, MOTOR_LAG_S)

@@ -78,7 +78,8 @@ def log_determinant(matrix: Matrix, basis: Matrix) -> Value:
 def minimise(problem: Problem, start: Matrix, rate_nats: float) -> Matrix:
     """Return the covariance of least cost that the rate can hold; `start` is strictly within."""
     basis = symmetric_basis(len(start))
-    barrier = _Barrier(problem, rate_nats, basis, problem.slack_basis(basis))
+    gradient = np.sum(problem.cost * basis, axis=(1, 2))
+    barrier = _Barrier(problem, rate_nats, basis, problem.slack_basis(basis), gradient)
     point = start
     cost = float(np.sum(problem.cost * point))
     weight = 1.0 / cost
@@ -89,15 +90,14 @@ def minimise(problem: Problem, start: Matrix, rate_nats: float) -> Matrix:
     return point
 
 
-class _Barrier:
+class _Barrier(NamedTuple):
     """`t tr(M P) - log(r - rate) - log det P - log det K`, infinite outside of the constraints."""
 
-    def __init__(self, problem: Problem, rate_nats: float, basis: Matrix, images: Matrix) -> None:
-        self.problem = problem
-        self.rate_nats = rate_nats
-        self.basis = basis
-        self.images = images
-        self.cost_gradient = np.sum(problem.cost * basis, axis=(1, 2))
+    problem: Problem
+    rate_nats: float
+    basis: Matrix
+    images: Matrix
+    cost_gradient: Matrix
 
     def at(self, point: Matrix, weight: float) -> Value:
         positive = log_determinant(point, self.basis)

@@ -18,7 +18,7 @@ With `b` bits at a time, one word per period T, the error is the mean over the p
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -58,11 +58,16 @@ def floor_covariance(model: LinearModel, rate_bit_s: float, erased: float = 0.0)
 def _floor_covariance(matrices: tuple[bytes, ...], rate_bit_s: float) -> Matrix:
     """Solve for it once: all flights of a plant ask for the same, which takes longer than they do."""
     states = math.isqrt(len(matrices[0]) // 8)
-    scaled = _Scaled(
-        LinearModel(*(np.frombuffer(one).reshape(states, states) for one in matrices)), rate_bit_s
-    )
+    model = LinearModel(*(np.frombuffer(one).reshape(states, states) for one in matrices))
+    scaled, covariance = _solved(model, rate_bit_s)
+    return scaled.back(covariance)
+
+
+def _solved(model: LinearModel, rate_bit_s: float) -> tuple[_Scaled, Matrix]:
+    """Return the scaled model, and its covariance at the floor."""
+    scaled = _Scaled(model, rate_bit_s)
     nats = scaled.rate_nats
-    return scaled.back(minimise(_Flow(scaled.model), _start(scaled.model, nats), nats))
+    return scaled, minimise(_Flow(scaled.model), _start(scaled.model, nats), nats)
 
 
 def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
@@ -72,10 +77,8 @@ def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
     `W = lambda/2 P^-1 Q P^-1 + A' Z + Z A`, it is `N = lambda/2 P^-1 - Z`: bits go where the eigenvalue
     of `N P` is largest, lambda/2, and no reduction of any other error is worth its bits.
     """
-    scaled = _Scaled(model, rate_bit_s)
-    nats = scaled.rate_nats
+    scaled, covariance = _solved(model, rate_bit_s)
     one = scaled.model
-    covariance = minimise(_Flow(one), _start(one, nats), nats)
     inverse = np.linalg.inv(covariance)
     # The barrier's Z is a multiple of K^-1.
     slack = np.linalg.inv(_Flow(one).slack(covariance))
@@ -172,15 +175,26 @@ def _start(model: LinearModel, rate_nats: float) -> Matrix:
     theorem's to any.
     """
     identity = np.eye(model.states)
-    least = rate_needed(model.dynamics) * LN2
-    log_gain, step = 0.5 * math.log(2.0 * rate_nats / model.states), 1.0
-    while True:
+
+    def at(log_gain: float) -> tuple[float, Matrix]:
         seen = identity * math.exp(log_gain)
         found = scipy.linalg.solve_continuous_are(model.dynamics.T, seen, model.noise, identity)
-        rate = 0.5 * math.exp(2.0 * log_gain) * float(np.trace(found))
-        share = (rate - least) / (rate_nats - least)
+        return 0.5 * math.exp(2.0 * log_gain) * float(np.trace(found)), np.asarray(found)
+
+    guess = 0.5 * math.log(2.0 * rate_nats / model.states)
+    return _between(at, rate_needed(model.dynamics) * LN2, rate_nats, guess)
+
+
+def _between(
+    at: Callable[[float], tuple[float, Matrix]], least: float, most: float, log_gain: float
+) -> Matrix:
+    """Return the covariance at a gain whose rate is well between two; the rate rises with the gain."""
+    step = 1.0
+    while True:
+        rate, covariance = at(log_gain)
+        share = (rate - least) / (most - least)
         if STARTING[0] < share < STARTING[1]:
-            return np.asarray(0.5 * (found + found.T))
+            return 0.5 * (covariance + covariance.T)
         # Smaller steps once the rate has been passed.
         step = step if (share < STARTING[0]) == (step > 0.0) else -0.5 * step
         log_gain += step
@@ -235,38 +249,17 @@ class _Words:
         """what grows within a period whatever the words say"""
 
     def start(self, rate_nats: float) -> Matrix:
-        """Return a covariance strictly within: the limit of a filter that sees every state."""
-        share = math.exp(-2.0 * 0.9 * rate_nats / self.model.states)
-        radius = float(np.abs(np.linalg.eigvals(self.transition)).max())
-        if share * radius**2 < 1.0 - 1e-6:
-            # P = share (F P F' + Q) is a fixed point for a share that contracts; its rate is
-            # -n/2 log share, all of the states' directions alike.
-            contracting = math.sqrt(share) * self.transition
-            return np.asarray(scipy.linalg.solve_discrete_lyapunov(contracting, share * self.noise))
-        return self._riccati_start(rate_nats)
-
-    def _riccati_start(self, rate_nats: float) -> Matrix:
-        """For plants that grow unevenly: bisect on how well every state is seen."""
-        size = float(np.trace(self.noise))
-
-        def after(gain: float) -> Matrix:
-            covariance = self.noise
-            for _ in range(5000):
-                ahead = self.transition @ covariance @ self.transition.T + self.noise
-                unseen = np.eye(len(ahead)) + gain / size * ahead
-                following = np.asarray(np.linalg.solve(unseen, ahead), dtype=np.float64)
-                if (np.abs(following - covariance) <= 1e-12 * np.abs(covariance)).all():
-                    break
-                covariance = following
-            return 0.5 * (covariance + covariance.T)
-
-        wanted = 0.5 * (rate_nats + max(0.0, _growth_nats(self.transition)))
+        """Return a covariance strictly within: that of a filter that sees every state equally well."""
+        identity, unit = np.eye(self.model.states), math.sqrt(float(np.trace(self.noise)))
         basis = np.zeros((0, *self.noise.shape))
 
-        def excess(log_gain: float) -> float:
-            return self.rate(after(math.exp(log_gain)), basis).value - wanted
+        def at(log_gain: float) -> tuple[float, Matrix]:
+            seen = identity * math.exp(log_gain) / unit
+            ahead = scipy.linalg.solve_discrete_are(self.transition.T, seen, self.noise, identity)
+            found: Matrix = np.asarray(np.linalg.solve(identity + seen @ seen @ ahead, ahead), float)
+            return self.rate(found, basis).value, found
 
-        return after(math.exp(scipy.optimize.brentq(excess, -30.0, 30.0, xtol=1e-3)))
+        return _between(at, max(0.0, _growth_nats(self.transition)), rate_nats, 0.0)
 
     def rate(self, covariance: Matrix, basis: Matrix) -> Value:
         images = self.transition @ basis @ self.transition.T

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
+
+from plant_sim.zero_order_hold import van_loan
 
 Matrix: TypeAlias = NDArray[np.float64]
 
@@ -146,16 +147,3 @@ def rate_needed(dynamics: ArrayLike) -> float:
 def sampled(model: LinearModel, period_s: float) -> tuple[Matrix, Matrix]:
     """Return transition matrix and noise covariance over a period."""
     return van_loan(model.dynamics, model.noise, period_s)
-
-
-def van_loan(dynamics: Matrix, noise: Matrix, period_s: float) -> tuple[Matrix, Matrix]:
-    """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
-    states = len(dynamics)
-    block = np.zeros((2 * states, 2 * states))
-    block[:states, :states] = -dynamics
-    block[:states, states:] = noise
-    block[states:, states:] = dynamics.T
-    exponential = scipy.linalg.expm(block * period_s)
-    transition = exponential[states:, states:].T
-    covariance = transition @ exponential[:states, states:]
-    return transition, 0.5 * (covariance + covariance.T)

@@ -48,8 +48,9 @@ def _of_plant(agreement: Agreement, steps: Sequence[float]) -> GapGauge | None:
     # Here: these take scipy, and so half a second that other flights need not wait.
     import numpy as np
 
+    from plant_sim.zero_order_hold import van_loan
     from tenbaud.bounds.floor import floor
-    from tenbaud.bounds.linear import rate_needed, reached, van_loan
+    from tenbaud.bounds.linear import rate_needed, reached
     from tenbaud.bounds.strength import LinearStrength
     from tenbaud.design.described import corrected_part, plant_of
 

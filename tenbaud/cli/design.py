@@ -15,7 +15,7 @@ from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
     from channel.codec.signals import Signal
-    from tenbaud.design.floors import Floors
+    from tenbaud.design.plant import Floors
 
 
 def floor(
@@ -40,7 +40,7 @@ def floor(
     from tenbaud.build.codec import configured_rate
     from tenbaud.config.load import load_config
     from tenbaud.design.described import linear_of, plant_of, plant_section
-    from tenbaud.design.floors import floors
+    from tenbaud.design.plant import floors
 
     period = None
     if plant is not None:

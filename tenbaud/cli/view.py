@@ -66,11 +66,11 @@ def view(page: PageOptions) -> None:
         options.print_json(schema_json())
         return
     from channel.links.endpoints import loopback_host
-    from tenbaud.view.server import Address, free_port
+    from tenbaud.view.server import Address
 
     # As in a URL, or bare.
     host = loopback_host() if page.host is None else page.host.removeprefix("[").removesuffix("]")
-    address = Address(host, page.port or free_port(host), page.insecure)
+    address = Address(host, page.port, page.insecure)
     if page.runs:
         if page.connect or page.keys or page.session != "**":
             raise typer.BadParameter(
@@ -112,7 +112,7 @@ def _replay(runs: list[Path], address: Address, open_browser: bool) -> None:
     from tenbaud.view.replay import serve_recorded
 
     # What is wrong with the port is said before minutes of recordings are read.
-    address.check()
+    address = address.checked()
     flights = recorded_flights([Run(one) for one in runs])
     Interruptions.require_none()
     serve_recorded(flights, address, open_browser=open_browser)

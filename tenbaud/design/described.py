@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -138,11 +139,5 @@ def corrected_part(plant: LinearPlant, states: int) -> LinearPlant:
             f"only the first {states} of {len(plant.A)} states take corrections, so the others must "
             "follow from the commands alone; the disturbance or the first states reach them"
         )
-    return LinearPlant(
-        plant.A[kept, kept],
-        plant.B[kept],
-        plant.C[:, kept],
-        plant.G[kept],
-        plant.densities,
-        plant.weights,
-    )
+    own = {"A": plant.A[kept, kept], "B": plant.B[kept], "C": plant.C[:, kept], "G": plant.G[kept]}
+    return replace(plant, **own)

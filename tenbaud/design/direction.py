@@ -16,9 +16,9 @@ import numpy as np
 
 from channel.codec.coders.direction import SQUARINGS, DirectionParameters
 from channel.codec.coders.learning import LearningParameters
-from plant_sim.zero_order_hold import discretised
+from plant_sim.zero_order_hold import discretised, van_loan
 from tenbaud.bounds.floor import ideal_worth, period_cost, require_rate
-from tenbaud.bounds.linear import Matrix, rate_needed, sampled, van_loan
+from tenbaud.bounds.linear import Matrix, rate_needed, sampled
 from tenbaud.design.plant import LinearPlant, rows_of
 
 ROUNDS = 25
@@ -81,14 +81,14 @@ def design_direction(
 
 
 def design_learning(
-    plant: LinearPlant, rate_bit_s: float, symbol_period_s: float, *, adapts: bool = True
+    plant: LinearPlant, rate_bit_s: float, symbol_period_s: float
 ) -> LearningParameters:
     """Return what the coder `learning` needs, but for what it learns; see `design_direction`.
 
     ValueError for a plant that grows: near its smallest rate what is learned goes astray there, and the
     plant is lost.
     """
-    found = design_direction(plant, rate_bit_s, symbol_period_s, adapts=adapts)
+    found = design_direction(plant, rate_bit_s, symbol_period_s)
     needed = rate_needed(plant.A)
     if needed > 0.0:
         raise ValueError(
@@ -117,7 +117,6 @@ def design_learning(
         reach=rows_of(discretised(plant.A, np.eye(len(F)), symbol_period_s)[1]),
         spreads=(),
         bits=found.bits,
-        adapts=adapts,
         removed=found.removed,
         step=found.step,
     )

@@ -38,8 +38,7 @@ def encoders_of(section: EncodersSection, signals: Signals) -> tuple[OutputReade
 
 def steps_of(section: EncodersSection, signals: Signals) -> list[float]:
     """Return the step of each output's reader, in the output's unit; 0 if it is read exactly."""
-    readers = encoders_of(section, signals)
-    return [one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers]
+    return [one.step for one in encoders_of(section, signals)]
 
 
 def _check_units(field: str, section: EncoderSection, output: Signal) -> None:

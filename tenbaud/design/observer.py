@@ -17,7 +17,8 @@ from channel.codec.coders.direction import DirectionCoder
 from channel.codec.coders.learning import LearningCoder
 from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
-from tenbaud.bounds.linear import Matrix, van_loan
+from plant_sim.zero_order_hold import van_loan
+from tenbaud.bounds.linear import Matrix
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import plant_of
 from tenbaud.design.plant import rows_of
@@ -29,14 +30,12 @@ LEAST_NOISE = 1e-9
 """of every state, as a share of the largest: a state that no noise reaches is still looked at"""
 
 
-def linear_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
-    """Return the observer of a linear model; see `kalman_observer`."""
-    return _of_linear(model, model, tick_noise, steps)
-
-
-def _of_linear(model: Model, plant: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
+def linear_observer(
+    plant: LinearModel, tick_noise: Matrix, steps: Matrix, model: Model | None = None
+) -> StateObserver:
+    """Return the observer of a linear model, or of one that learns beside it; see `kalman_observer`."""
     transition = np.array(plant.constants.transition).reshape(plant.state_size, plant.state_size)
-    return kalman_observer(model, transition, np.array(plant.outputs), tick_noise, steps)
+    return kalman_observer(model or plant, transition, np.array(plant.outputs), tick_noise, steps)
 
 
 def kalman_observer(
@@ -79,7 +78,7 @@ def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
     noise = np.zeros((plant.state_size, plant.state_size))
     corrected = plant.correction_size
     noise[:corrected, :corrected] = both / codec.ticks_per_sample
-    return _of_linear(codec.model, plant, noise, np.array([math.tau / counts_per_turn]))
+    return linear_observer(plant, noise, np.array([math.tau / counts_per_turn]), codec.model)
 
 
 def configured_observer(model: Model, config: FlightConfig, steps: Sequence[float]) -> StateObserver:
@@ -90,5 +89,5 @@ def configured_observer(model: Model, config: FlightConfig, steps: Sequence[floa
         raise ValueError(f"model.kind = {config.model.kind!r} describes no plant to observe")
     transition, noise = van_loan(plant.A, plant.noise, tick_s)
     if isinstance(found := plant_model(model), LinearModel):
-        return _of_linear(model, found, noise, np.array(steps))
+        return linear_observer(found, noise, np.array(steps), model)
     return kalman_observer(model, transition, plant.C, noise, np.array(steps))

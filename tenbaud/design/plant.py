@@ -1,10 +1,11 @@
-"""A linear plant for designs and floors.
+"""A linear plant for designs, and its floors: the figures of `tenbaud floor`.
 
 dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from tenbaud.bounds.linear import LinearModel, Matrix, linear_model
+from tenbaud.bounds.floor import floor_covariance, word_floor
+from tenbaud.bounds.linear import LinearModel, Matrix, linear_model, rate_needed, reached
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +82,43 @@ def behind_encoders(
     found = scipy.linalg.solve_continuous_are(plant.A.T, plant.C.T, plant.noise, np.diag(seen))
     own: Matrix = np.asarray(found, dtype=np.float64)
     return replace(plant, G=own @ plant.C.T / seen, densities=seen), own
+
+
+@dataclass(frozen=True, slots=True)
+class Floors:
+    """The least errors at a rate; none where it is too low for the plant."""
+
+    rate_bit_s: float
+    rate_needed_bit_s: float
+    """more than this is needed by the data-rate theorem"""
+    rms: tuple[float, ...] | None
+    """per output, together the least by their weights, for bits that flow all the time"""
+    weighted_rms: float | None
+    """root of the weighted sum of their squares"""
+    words_over_flow: float | None
+    """by how much that root is larger when the bits come one word per symbol period"""
+
+
+def floors(plant: LinearPlant, rate_bit_s: float, symbol_period_s: float | None = None) -> Floors:
+    """Return the floors of a plant at a rate; with a symbol period, those of its words too.
+
+    States that no disturbance reaches are known to both ends from the commands. ValueError where the
+    outputs do not show all that is disturbed.
+    """
+    needed = rate_needed(plant.A)
+    if not rate_bit_s > needed:
+        return Floors(rate_bit_s, needed, None, None, None)
+    model, basis = reached(plant.A, plant.noise, plant.C, plant.weights)
+    covariance = floor_covariance(model, rate_bit_s)
+    seen = plant.C @ basis
+    squares = np.einsum("ij,jk,ik->i", seen, covariance, seen)
+    least = float(plant.weights @ squares)
+    over = None
+    if symbol_period_s is not None:
+        words = word_floor(model, rate_bit_s * symbol_period_s, symbol_period_s)
+        over = math.sqrt(words / least)
+    rms = tuple(float(value) for value in np.sqrt(squares))
+    return Floors(rate_bit_s, needed, rms, math.sqrt(least), over)
 
 
 def rows_of(matrix: Matrix) -> tuple[tuple[float, ...], ...]:

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plant_sim.zero_order_hold import differences
 from tenbaud.bounds.linear import Matrix
 from tenbaud.config.load import ConfigError
 
@@ -228,13 +229,8 @@ def _slopes(both: Callable[[Matrix, Matrix], Matrix], x: Matrix, u: Matrix) -> M
     """Return the derivatives of dynamics and outputs, a column for each state and input."""
     size = len(x)
     at = np.concatenate([x, u])
-    columns = []
-    for place, value in enumerate(at):
-        step = np.zeros_like(at)
-        step[place] = STEP * max(1.0, 2.0 ** math.floor(math.log2(abs(value) or 1.0)))
-        ahead, behind = (both(one[:size], one[size:]) for one in (at + step, at - step))
-        columns.append((ahead - behind) / (2.0 * step[place]))
-    slopes = np.array(columns).T
+    steps = [STEP * max(1.0, 2.0 ** math.floor(math.log2(abs(value) or 1.0))) for value in at]
+    slopes = differences(lambda one: both(one[:size], one[size:]), at, np.array(steps))
     if not np.isfinite(slopes).all():
         raise ConfigError("the system has no finite derivative at the operating point")
     slopes[abs(slopes) < LEAST * max(1.0, float(abs(slopes).max()))] = 0.0

@@ -11,7 +11,7 @@ from typing import Any
 
 from channel.codec.numerics import refuse
 from tenbaud.export.expressions import POWER, Expressions
-from tenbaud.export.scope import Callee
+from tenbaud.export.scope import Written
 from tenbaud.export.source import source_of
 from tenbaud.export.values import (
     DOUBLE,
@@ -148,7 +148,7 @@ class Calls(Expressions):
         self.emit(f"{name} = {callee.name}({', '.join(texts)});")
         return self._parts(returns, name)
 
-    def _kept(self, node: ast.Call, callee: Callee, value: Scalar) -> Scalar:
+    def _kept(self, node: ast.Call, callee: Written, value: Scalar) -> Scalar:
         """Return the result; of a call that writes it is taken at once."""
         if not callee.written:
             return value
@@ -179,7 +179,7 @@ class Calls(Expressions):
             return self.array(node, value)
         return Pack(tuple([self._prepared(node, one) for one in value.items]))
 
-    def _passed(self, node: ast.Call, callee: Callee, arguments: Sequence[Value]) -> list[str]:
+    def _passed(self, node: ast.Call, callee: Written, arguments: Sequence[Value]) -> list[str]:
         """Return the arguments in C: nothing for what is known beforehand, but for its numbers."""
         texts: list[str] = []
         for one in [leaf for argument in arguments for leaf in leaves(argument)]:

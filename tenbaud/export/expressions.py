@@ -99,7 +99,6 @@ class Expressions(Scope):
         return Pack(items)
 
     def _list(self, node: ast.List) -> Value:
-        """Make a list of these numbers."""
         self.require_statement(node)
         made = self.array(node, Pack(tuple([self.value(one) for one in node.elts])))
         return Array(made.kind, made.text, made.shape, is_list=True, is_stable=True)
@@ -164,7 +163,6 @@ class Expressions(Scope):
         return self.operation(node, node.op, self.value(node.left), self.value(node.right))
 
     def operation(self, node: ast.AST, op: ast.operator, left: Value, right: Value) -> Value:
-        """Return the result of an operator."""
         if type(op) in REFUSED:
             self.refuse(node, REFUSED[type(op)])
         text, known = OPERATORS[type(op)]

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+from tenbaud.export.scope import Shared, Written
 from tenbaud.export.source import Source, source_of
 from tenbaud.export.statements import SCALARS, Statements
 from tenbaud.export.values import (
@@ -21,66 +22,31 @@ from tenbaud.export.values import (
     Shape,
     Static,
     Value,
-    literal,
 )
 
 FUNCTIONS_MAX = 500
 
 
-@dataclass(slots=True)
-class Written:
-    """A function in C."""
-
-    name: str
-    returns: Shape
-    written: set[int] = field(default_factory=set)
-    prototype: str = ""
-    text: str = ""
-
-
-class Program:
+class Program(Shared):
     """Tables, types and functions, in the order in which C needs them."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.functions: dict[tuple[object, ...], Written] = {}
         self._order: list[Written] = []
-        self._tables: dict[tuple[str, tuple[str, ...]], str] = {}
-        self._structs: dict[str, str] = {}
-        # Those of codec.h: a module of that name may be translated too.
-        self._names: set[str] = {"codec_is_estimate", "codec_limited", "codec_simulate"}
         self._kept: list[object] = []
         """what is known by its identity"""
 
     def text(self) -> str:
-        """Return the whole program."""
         tables = [
             f"static const {kind} {name}[] = {{{', '.join(numbers)}}};"
-            for (kind, numbers), name in self._tables.items()
+            for (kind, numbers), name in self.tables.items()
         ]
         prototypes = [f"{one.prototype};" for one in self._order]
         return "\n".join(
-            [*self._structs.values(), "", *tables, "", *prototypes, ""]
+            [*self.structs.values(), "", *tables, "", *prototypes, ""]
             + [one.text for one in self._order]
         )
-
-    def table(self, kind: str, values: Sequence[Any], name: str) -> str:
-        """Return the name of a table of constants."""
-        texts = tuple([literal(float(one) if kind == DOUBLE else one) for one in values] or ["0"])
-        if (kind, texts) not in self._tables:
-            self._tables[kind, texts] = self._free(f"table_{name}" if name else "table")
-        return self._tables[kind, texts]
-
-    def struct(self, shape: Shape) -> str:
-        """Return the name of a type for several values."""
-        name = f"struct values_{shape.tag}"
-        if name not in self._structs:
-            fields = []
-            for at, one in enumerate(shape.items):
-                kind = self.struct(one) if one.items else one.kind
-                sizes = "".join([f"[{size}]" for size in one.shape])
-                fields.append(f"{kind} f{at}{sizes};")
-            self._structs[name] = f"{name} {{ {' '.join(fields)} }};"
-        return name
 
     def function(self, function: Any, arguments: Sequence[Value], name: str = "") -> Written:
         """Return a function for arguments of these types, written if it is not yet, with this name."""
@@ -97,7 +63,7 @@ class Program:
         if len(self.functions) >= FUNCTIONS_MAX:
             raise source.error(source.tree, f"more than {FUNCTIONS_MAX} functions: a call without end?")
         module = source.function.__module__.rpartition(".")[2]
-        name = self._free(name or f"{module}_{source.function.__name__.strip('_')}")
+        name = self.free(name or f"{module}_{source.function.__name__.strip('_')}")
         made = Written(name, annotated(source) or Shape(""))
         self.functions[key] = made
         writer = Statements(self, source)
@@ -148,15 +114,6 @@ class Program:
             case Pack():
                 return tuple([self._key(one) for one in value.items])
 
-    def _free(self, name: str) -> str:
-        """Return a name that nothing has yet."""
-        at, found = 1, name
-        while found in self._names:
-            at += 1
-            found = f"{name}_{at}"
-        self._names.add(found)
-        return found
-
 
 @dataclass(frozen=True, slots=True)
 class Argument:
@@ -167,7 +124,6 @@ class Argument:
     is_pointer: bool
 
     def declaration(self, is_written: bool) -> str:
-        """Return it as a prototype has it."""
         if not self.is_pointer:
             return f"{self.kind} {self.name}"
         return f"{'' if is_written else 'const '}{self.kind} *{self.name}"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn, Protocol
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
 
 from tenbaud.export.source import Source
 from tenbaud.export.values import (
@@ -33,32 +35,63 @@ KEYWORD = re.compile(
 )
 
 
-class Callee(Protocol):
-    """A function of the program, as a call needs it."""
+@dataclass(slots=True)
+class Written:
+    """A function in C."""
 
     name: str
     returns: Shape
-    written: set[int]
+    written: set[int] = field(default_factory=set)
     """places of the arguments, in C, that it writes to"""
+    prototype: str = ""
+    text: str = ""
 
 
-class Program(Protocol):
-    """What all functions share."""
+class Shared(ABC):
+    """What all functions of a program share: tables, types and names."""
+
+    def __init__(self) -> None:
+        self.tables: dict[tuple[str, tuple[str, ...]], str] = {}
+        self.structs: dict[str, str] = {}
+        # Those of codec.h: a module of that name may be translated too.
+        self._names: set[str] = {"codec_is_estimate", "codec_limited", "codec_simulate"}
+
+    @abstractmethod
+    def function(self, function: Any, arguments: Sequence[Value]) -> Written:
+        """Return a function for arguments of these types, written if it is not yet."""
 
     def table(self, kind: str, values: Sequence[Any], name: str) -> str:
         """Return the name of a table of constants."""
+        texts = tuple([literal(float(one) if kind == DOUBLE else one) for one in values] or ["0"])
+        if (kind, texts) not in self.tables:
+            self.tables[kind, texts] = self.free(f"table_{name}" if name else "table")
+        return self.tables[kind, texts]
 
     def struct(self, shape: Shape) -> str:
         """Return the name of a type for several values."""
+        name = f"struct values_{shape.tag}"
+        if name not in self.structs:
+            fields = []
+            for at, one in enumerate(shape.items):
+                kind = self.struct(one) if one.items else one.kind
+                sizes = "".join([f"[{size}]" for size in one.shape])
+                fields.append(f"{kind} f{at}{sizes};")
+            self.structs[name] = f"{name} {{ {' '.join(fields)} }};"
+        return name
 
-    def function(self, function: Any, arguments: Sequence[Value]) -> Callee:
-        """Return a function for arguments of these types, written if it is not yet."""
+    def free(self, name: str) -> str:
+        at, found = 1, name
+        while found in self._names:
+            at += 1
+            found = f"{name}_{at}"
+        self._names.add(found)
+        return found
 
 
 class Scope:
     """Names, declarations and lines of a function."""
 
-    def __init__(self, program: Program, source: Source) -> None:
+    def __init__(self, program: Shared, source: Source) -> None:
         self.program = program
         self.source = source
         self.names: dict[str, Value] = {}
@@ -117,13 +150,11 @@ class Scope:
             )
 
     def memory(self, kind: str, size: int) -> str:
-        """Return the name of new memory."""
         name = self.temporary()
         self.declare(name, f"{kind} {name}[{max(size, 1)}]")
         return name
 
     def declarations(self) -> list[str]:
-        """Return the declarations, when it is known what is written to."""
         return [
             f"    {'const ' if root and root not in self.written else ''}{text};"
             for text, root in self.declared.values()
@@ -138,7 +169,6 @@ class Scope:
             self.refuse(node, str(error))
 
     def scalar(self, node: ast.AST, value: Value) -> Scalar:
-        """Return a value as one number."""
         match value:
             case Scalar():
                 return value
@@ -210,7 +240,6 @@ class Scope:
         return found
 
     def element(self, node: ast.AST, value: Array, index: Value) -> Value:
-        """Return an entry, or a row, at an index."""
         count, rest = value.shape[0], value.shape[1:]
         text = self.index(node, index, count)
         if not rest:

@@ -272,7 +272,6 @@ class Statements(Calls):
         self.emit("return;")
 
     def _fill(self, node: ast.AST, shape: Shape, value: Value, text: str) -> None:
-        """Write the fields of a struct."""
         for at, (one, wanted) in enumerate(
             zip(self.items(node, value, len(shape.items)), shape.items, strict=True)
         ):

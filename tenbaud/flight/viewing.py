@@ -38,13 +38,10 @@ class ViewOptions:
     @classmethod
     def checked(cls, port: int, open_browser: bool) -> ViewOptions:
         """Return the options of a page that can be served, on any free port for 0."""
-        from tenbaud.view.server import Address, free_port, require_nicegui
+        from tenbaud.view.server import Address, require_nicegui
 
         require_nicegui()
-        host = loopback_host()
-        address = Address(host, port or free_port(host))
-        address.check()
-        return cls(address.port, open_browser)
+        return cls(Address(loopback_host(), port).checked().port, open_browser)
 
 
 Views = Mapping[Role, TelemetryOptions]

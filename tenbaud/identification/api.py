@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.pipeline import Options
-from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.pipeline import OF_A_LOG, Options
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters
+from plant_sim.identification.structures import PitchStructure
 from tenbaud.build.signals import build_limits, configured_signals
 from tenbaud.config.load import given_names, load_config, nested
 from tenbaud.config.schema import FlightConfig, FlightLogSection
@@ -22,8 +22,7 @@ from tenbaud.identification import written
 from tenbaud.identification.beside import TRUE, Beside, beside, true_values
 from tenbaud.identification.bits import Bits, run_bits
 from tenbaud.identification.closed_loop import with_commands
-from tenbaud.identification.coder import with_coder
-from tenbaud.identification.flown import Flown, fly_record
+from tenbaud.identification.flown import Flown, fly_record, with_coder
 from tenbaud.identification.run import Identified, Wanted, run
 from tenbaud.identification.sources import Source, from_arrays, from_bits, from_log, from_rig
 
@@ -296,18 +295,13 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
     elif "model.motor_lag_s" in request.given or (excited and config.transmitter.rig == "simulated"):
         # The settings of a preset are for the preset's plant.
         lag_s = getattr(config.model, "motor_lag_s", None)
-    forgetting = request.forgetting_per_s
-    paper = Filters()
-    if forgetting is None:
-        forgetting = paper.forgetting_per_s if excited else 0.0
-    options = Options(
-        lag_s,
-        request.bandwidth_rad_s if not excited else request.bandwidth_rad_s or paper.bandwidth_rad_s,
-        request.damping,
-        forgetting,
-        paper.gain if excited else None,
-        rests=excited,
-    )
+    bandwidth_rad_s, filters = request.bandwidth_rad_s, OF_A_LOG
+    if excited:
+        filters = Filters()
+        bandwidth_rad_s = bandwidth_rad_s or filters.bandwidth_rad_s
+    if request.forgetting_per_s is not None:
+        filters = replace(filters, forgetting_per_s=request.forgetting_per_s)
+    options = Options(lag_s, bandwidth_rad_s, replace(filters, damping=request.damping))
     limited = excited or "limits.command_max" in request.given
     volts_max = float("inf")
     own = tuple([one.name for one in configured_signals(config).outputs])

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from channel.errors import TenbaudError
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.pipeline import Identification, Options, identify
-from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.structures import PitchStructure
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.identification.bits import Bits

@@ -22,7 +22,7 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.identification.linearised import Linearised, linearised, start_values
 from tenbaud.identification.run import Identified
 from tenbaud.identification.statements import Statement, statements_of
-from tenbaud.identification.structure import choose
+from tenbaud.identification.structure import choose, record_of
 from tenbaud.replay.pack import Epoch
 from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 
@@ -51,7 +51,6 @@ class Bits:
 
     @property
     def config(self) -> FlightConfig:
-        """Return the configuration that flew."""
         return self.agreement.config
 
     def record(self) -> Record:
@@ -60,16 +59,9 @@ class Bits:
         model, ticks = self.agreement.codec.model, self.agreement.terms.ticks_per_sample
         outputs = np.array([model.measured(state) for state in self.states])
         at, samples = np.arange(len(self.commands)) / ticks, np.arange(len(outputs))
-        return Record(
-            self.agreement.terms.tick_ns / 1e9,
-            np.stack([np.interp(at, samples, one) for one in outputs.T], axis=1),
-            self.commands,
-            tuple([one.name for one in signals.outputs]),
-            tuple([one.name for one in signals.inputs]),
-            tuple([one.unit for one in signals.outputs]),
-            tuple([one.unit for one in signals.inputs]),
-            tuple(encoder_steps(self.config, signals)),
-        )
+        between = np.stack([np.interp(at, samples, one) for one in outputs.T], axis=1)
+        tick_s, steps = self.agreement.terms.tick_ns / 1e9, encoder_steps(self.config, signals)
+        return record_of(tick_s, between, self.commands, signals, steps)
 
 
 def read_bits(path: Path) -> Bits:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from plant_sim.identification.filters import Array
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.regression import Regression
+from plant_sim.identification.structures import PitchStructure
 from tenbaud.identification.run import Identified
 from tenbaud.recording.style import LINE_A, LINE_B, decimated, legend_above, new_figure, save
 

@@ -1,4 +1,4 @@
-"""The record, flown with the model identified from it."""
+"""The record, flown with the model identified from it, and with a coder fitted to it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
+from channel.errors import TenbaudError
 from tenbaud.build.recorded import flight_config
 from tenbaud.config.load import merged
 from tenbaud.config.schema import FlightConfig
@@ -32,7 +33,6 @@ class Flown(NamedTuple):
         return math.hypot(*shares) if self.outcome == "ok" and shares else math.inf
 
     def sentence(self) -> str:
-        """Return the figures for people."""
         if self.outcome != "ok":
             return f"the record could not be flown with it: {self.outcome}"
         parts = [
@@ -80,3 +80,21 @@ def _fly(config: FlightConfig) -> FlightFigures:
         with suppress(ImportError):  # numba is an extra
             return fly_point(config, seeds, "auto")[0]
     return fly_point(config, seeds, "plain")[0]
+
+
+def with_coder(values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """Return settings with a coder fitted quickly to their record, and a note where it could not be.
+
+    Then the coder stays that of the preset, or as it was designed for a linear model.
+    """
+    settings = dict(values)
+    try:
+        from tenbaud.studies.quick import quick_coder
+
+        found = quick_coder(replayed(settings))
+    except ImportError as error:
+        missing = f"{error.name} is missing: install tenbaud[studies]"
+        return settings, f"the coder was not fitted to the record, as {missing}"
+    except TenbaudError as error:
+        return settings, f"the coder was not fitted to the record: {error}"
+    return merged(settings, found.sections), ""

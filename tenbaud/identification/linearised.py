@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +9,8 @@ import numpy as np
 from channel.codec.codec import Model, Vector
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.filters import Array
-from plant_sim.identification.pitch import COSINE, SINE, PitchStructure
-from plant_sim.identification.structures import Structure, names_of
+from plant_sim.identification.structures import COSINE, SINE, PitchStructure, Structure, names_of
+from plant_sim.zero_order_hold import differences
 
 ORDER_MAX = 2
 NUDGE = 1e-4
@@ -52,13 +51,15 @@ def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Line
         )
     start, held = np.array(model.initial()[:size]), np.array(command)
 
-    def found(corrected: Array, inputs: Array) -> tuple[Array, Array]:
-        derivatives = _derivatives(model, corrected, inputs, tick_s)[: order + 1]
-        return np.stack(derivatives[:-1], axis=1).ravel(), derivatives[-1]
+    def found(both: Array) -> Array:
+        """Return z, then the highest derivative of each output."""
+        derivatives = _derivatives(model, both[:size], both[size:], tick_s)[: order + 1]
+        return np.concatenate((np.stack(derivatives[:-1], axis=1).ravel(), derivatives[-1]))
 
-    state, highest = found(start, held)
-    by_corrected, turned = _differences(lambda x: found(x, held), start)
-    _, by_input = _differences(lambda u: found(start, u), held)
+    at = np.concatenate((start, held))
+    state, highest = np.split(found(at), [size])
+    slopes = differences(found, at, np.full(len(at), NUDGE))
+    by_corrected, turned, by_input = slopes[:size, :size], slopes[size:, :size], slopes[size:, size:]
     if np.linalg.cond(by_corrected) > CONDITION_MAX:
         raise IdentificationError(
             f"the first {size} states of the codec's model do not determine the outputs and rates "
@@ -67,18 +68,6 @@ def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Line
     by_state = turned @ np.linalg.inv(by_corrected)
     force = highest - by_state @ state - by_input @ held
     return Linearised(start, state, by_corrected, by_state, by_input, force)
-
-
-def _differences(function: Callable[[Array], tuple[Array, Array]], at: Array) -> tuple[Array, Array]:
-    """Return the derivatives of both results, a column for each entry of the argument."""
-    pairs = []
-    for index in range(len(at)):
-        moved = np.zeros_like(at)
-        moved[index] = NUDGE
-        ups, downs = function(at + moved), function(at - moved)
-        pairs.append([(up - down) / (2.0 * NUDGE) for up, down in zip(ups, downs, strict=True)])
-    first, second = ([pair[which] for pair in pairs] for which in (0, 1))
-    return np.stack(first, axis=1), np.stack(second, axis=1)
 
 
 def _derivatives(model: Model, corrected: Array, inputs: Array, tick_s: float) -> list[Array]:

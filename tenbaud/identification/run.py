@@ -13,10 +13,9 @@ from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.faults import require_units
 from plant_sim.identification.filters import Array
 from plant_sim.identification.pipeline import Identification, Options
-from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import regress
-from plant_sim.identification.structures import names_of
+from plant_sim.identification.structures import PitchStructure, names_of
 from tenbaud.identification.structure import Chosen, choose
 from tenbaud.log.angles import turn_of, unwrapped
 

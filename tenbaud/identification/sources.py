@@ -18,7 +18,7 @@ from tenbaud.build.rig import build_rig, real_rig_name
 from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
 from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.identification.bits import Bits, read_bits
-from tenbaud.identification.structure import SPEEDS
+from tenbaud.identification.structure import SPEEDS, record_of
 from tenbaud.log.angles import step_of
 from tenbaud.log.table import LogError
 
@@ -87,18 +87,7 @@ def from_log(
     signals = None if _own_signals(config, structure) else configured_signals(config)
     encoders = () if signals is None else build_encoders(config, signals)
     log = read_log(config.flight_log, signals, encoders, tick_s)
-    outputs, inputs = log.signals.outputs, log.signals.inputs[: log.commands.shape[1]]
-    record = Record(
-        log.tick_s,
-        log.measured,
-        log.commands,
-        tuple([one.name for one in outputs]),
-        tuple([one.name for one in inputs]),
-        tuple([one.unit for one in outputs]),
-        tuple([one.unit for one in inputs]),
-        log.steps,
-    )
-    return record, log.notes
+    return record_of(log.tick_s, log.measured, log.commands, log.signals, log.steps), log.notes
 
 
 def from_bits(path: Path) -> Source:

@@ -1,18 +1,38 @@
-"""The structure to identify: the requested one, or one that suits model and signals, and why."""
+"""A record of a model's signals, and the structure to identify: the requested or a suitable one."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
+from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.pitch import PitchStructure, quiescent_angle
+from plant_sim.identification.filters import Array
+from plant_sim.identification.pitch import quiescent_angle
 from plant_sim.identification.record import Record
-from plant_sim.identification.structures import Structure, parse_linear
+from plant_sim.identification.structures import PitchStructure, Structure, parse_linear
 
 SPEEDS = ("speed", "omega", "velocity", "rpm", "rate", "drehzahl")
 """words of an output's name that say that it has no rate"""
+
+
+def record_of(
+    step_s: float, outputs: Array, inputs: Array, signals: Signals, steps: Sequence[float]
+) -> Record:
+    """Return a record of these signals, as many inputs as there are columns; `steps` of the outputs."""
+    acting = signals.inputs[: inputs.shape[1]]
+    return Record(
+        step_s,
+        outputs,
+        inputs,
+        tuple([one.name for one in signals.outputs]),
+        tuple([one.name for one in acting]),
+        tuple([one.unit for one in signals.outputs]),
+        tuple([one.unit for one in acting]),
+        tuple(steps),
+    )
 
 
 class Chosen(NamedTuple):

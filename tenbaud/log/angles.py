@@ -84,12 +84,6 @@ def counts_of(values: Array, encoder: OutputReader | None) -> npt.NDArray[np.int
     return np.floor(values * EXACT_PER_UNIT).astype(np.int64)
 
 
-def values_of(counts: npt.NDArray[np.int64], encoder: Encoder) -> Array:
-    """Return the values that counts stand for: the arithmetic of `Encoder.angle_rad`."""
-    whole: Array = (encoder.sign * (counts - encoder.zero_counts)).astype(np.float64)
-    return whole * encoder.turn / encoder.counts_per_turn
-
-
 def step_of(values: Array) -> float:
     """Return how far the values of a quantised signal lie apart; 0 where no step shows."""
     seen = np.unique(values[:STEP_ROWS])

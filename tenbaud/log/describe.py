@@ -41,7 +41,6 @@ class Sampling:
 
     @property
     def words(self) -> str:
-        """The sampling in a sentence."""
         jitter = f"jitter up to {100.0 * self.jitter_s / self.step_s:.2g} % of it"
         even = "even" if self.jitter_s < 0.001 * self.step_s else jitter
         text = (
@@ -73,7 +72,6 @@ class Description:
         return {column: signal for signal, column in self.suggestion.taken.items()}
 
     def as_json(self) -> dict[str, Any]:
-        """Return it for programs."""
         columns = [
             {
                 "number": number,

@@ -55,7 +55,6 @@ class Dialect:
 
     @property
     def told(self) -> str:
-        """The dialect for people."""
         decimals = ", decimal commas" if self.decimal == "," else ""
         return f"text, {_SEPARATORS[self.separator]}{decimals}, {self.encoding}{self.note}"
 

@@ -11,7 +11,7 @@ from channel.codec.signals import Signal, Signals
 from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder, OutputReader
 from tenbaud.config.schema import FlightLogSection
-from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
+from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, without_spikes
 from tenbaud.log.beside import with_file_beside
 from tenbaud.log.clock import Clock, by_index, by_period, by_time, counts_rows, has_fractions
 from tenbaud.log.join import table_of
@@ -67,32 +67,28 @@ def read_log(
     def held() -> list[int | None]:
         return [place for _, place in chosen[-1].inputs]
 
-    table, notes = table_of(section, read, wanted, held)
-    return _Reading(table, chosen[-1], roles, encoders, tick_s, notes).log()
+    table, joined = table_of(section, read, wanted, held)
+    notes = (table.source, *joined, *chosen[-1].notes)
+    return _Reading(table, chosen[-1], roles, encoders, tick_s, list(notes)).log()
 
 
+@dataclass
 class _Reading:
     """One table on its way to a flight log."""
 
-    def __init__(
-        self,
-        table: Table,
-        chosen: Chosen,
-        roles: Roles,
-        encoders: tuple[OutputReader, ...],
-        tick_s: float | None,
-        notes: tuple[str, ...],
-    ) -> None:
-        self.table, self.chosen, self.roles = table, chosen, roles
-        self.section = roles.section
-        self.encoders = encoders
-        self.tick_s = tick_s
-        self.at = {place: at for at, place in enumerate(chosen.places)}
+    table: Table
+    chosen: Chosen
+    roles: Roles
+    encoders: tuple[OutputReader, ...]
+    tick_s: float | None
+    notes: list[str]
+
+    def __post_init__(self) -> None:
+        self.section = self.roles.section
+        self.at = {place: at for at, place in enumerate(self.chosen.places)}
         """place in the file to place in the table"""
-        self.notes = [table.source, *notes, *chosen.notes]
 
     def log(self) -> Log:
-        """Return the flight log."""
         clock = self._clock()
         rows = clock.rows.stop - clock.rows.start
         if rows < ROWS_MIN:
@@ -218,8 +214,9 @@ class _Reading:
                 self.notes.append(f"{signal.name}: 4096 counts a turn, as nothing says how many")
             self._check_whole(values, column, clock)
             counts[:, at] = np.round(clock.line(values)).astype(np.int64)
-            measured[:, at] = values_of(counts[:, at], encoder)
-            return encoder.turn / encoder.counts_per_turn
+            turned = encoder.sign * (counts[:, at] - encoder.zero_counts) * encoder.turn
+            measured[:, at] = turned / encoder.counts_per_turn
+            return encoder.step
         by = self._factor(unit, signal)
         measured[:, at] = clock.line(values) * by
         step = step_of(values) * by

@@ -43,7 +43,6 @@ class Chosen:
 
     @property
     def places(self) -> list[int]:
-        """The places of all columns that are read."""
         found = [place for _, place in self.outputs]
         found += [place for _, place in self.inputs if place is not None]
         return found + [place for place in (self.time, self.index) if place is not None]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from tenbaud.log.export import export_roles
-from tenbaud.log.table import Array, LogError, Table, Wanted
+from tenbaud.log.table import Array, LogError, Table, Wanted, export_roles
 from tenbaud.log.variables import ROWS_MIN, Clock, Variable, rows_first
 
 PARAMETER_SHARE = 0.05
@@ -41,18 +40,13 @@ def table_of(
     are in one of these sets. LogError names the variables and the option that chooses.
     """
     groups, left_out = _groups(list(variables))
-    group, places = _chosen(path, groups, left_out, wanted)
-    one = _columns(group)
-    left_out = [_listed(other) for other in groups if other is not group] + left_out
+    tables = [(group, _table(path, group)) for group in groups]
+    chosen = _chosen(path, tables, left_out, wanted)
+    left_out = [_listed(one) for group, one in tables if group is not chosen[0]] + left_out
     left = f"; left out: {', '.join(left_out[:LISTED_MAX])}" if left_out else ""
-    return Table(
-        str(path),
-        f"{kind}: {one.form}{left}",
-        tuple([one.names[place] for place in places]),
-        tuple([one.units[place] for place in places]),
-        tuple([np.ascontiguousarray(one.columns[place]) for place in places]),
-        roles=one.roles,
-    )
+    one = chosen[1]
+    columns = tuple([np.ascontiguousarray(column) for column in one.columns])
+    return replace(one, source=f"{kind}: {one.source}{left}", columns=columns)
 
 
 def flat_table(
@@ -109,60 +103,45 @@ def _groups(variables: list[Variable]) -> tuple[list[_Group], list[str]]:
 
 
 def _chosen(
-    path: Path, groups: list[_Group], left_out: list[str], wanted: Wanted | None
-) -> tuple[_Group, Sequence[int]]:
-    """Return the set of signals that is meant, and the places of the columns that are wanted."""
-    if not groups:
+    path: Path, tables: list[tuple[_Group, Table]], left_out: list[str], wanted: Wanted | None
+) -> tuple[_Group, Table]:
+    """Return the set of signals that is meant, with the columns that are wanted."""
+    if not tables:
         there = f"; it holds {', '.join(left_out[:LISTED_MAX])}" if left_out else ""
         raise LogError(
             f"{path} holds no signals{there}. Give a file with at least one array of numbers that has "
             f"{ROWS_MIN} rows or more."
         )
-    longest = max(one.rows for one in groups)
-    groups = [one for one in groups if one.clock or one.rows >= PARAMETER_SHARE * longest]
-    if len(groups) == 1:
-        return groups[0], _places(groups[0], wanted)
-    fitting = []
-    for group in groups:
-        with suppress(LogError):
-            _places(group, wanted)
-            fitting.append(group)
+    longest = max(group.rows for group, _ in tables)
+    tables = [one for one in tables if one[0].clock or one[0].rows >= PARAMETER_SHARE * longest]
+    fitting = tables
+    if len(tables) > 1:
+        fitting = []
+        for one in tables:
+            with suppress(LogError):
+                one[1].only(wanted)
+                fitting.append(one)
     if len(fitting) == 1:
-        return fitting[0], _places(fitting[0], wanted)
+        return fitting[0][0], fitting[0][1].only(wanted)
+    listed = "; ".join([_listed(table) for _, table in tables])
     raise LogError(
-        f"{path} holds {len(groups)} sets of signals, on different clocks or of different lengths: "
-        f"{'; '.join(map(_listed, groups))}. Choose one by the names of its columns, such as "
-        f"--columns output={groups[0].members[0][0].name}; to use several, save each as a separate "
-        "file and join them (`join` in the section [flight_log])."
+        f"{path} holds {len(tables)} sets of signals, on different clocks or of different lengths: "
+        f"{listed}. Choose one by the names of its columns, such as --columns output="
+        f"{tables[0][0].members[0][0].name}; to use several, save each as a separate file and join "
+        "them (`join` in the section [flight_log])."
     )
 
 
-def _places(group: _Group, wanted: Wanted | None) -> Sequence[int]:
-    one = _columns(group)
-    return range(len(one.names)) if wanted is None else wanted(one.names, one.units, one.roles)
+def _listed(table: Table) -> str:
+    more = ", ..." if len(table.names) > LISTED_MAX else ""
+    return f"{', '.join(table.names[:LISTED_MAX])}{more} ({len(table)} rows)"
 
 
-def _listed(group: _Group) -> str:
-    names = _columns(group).names
-    more = ", ..." if len(names) > LISTED_MAX else ""
-    return f"{', '.join(names[:LISTED_MAX])}{more} ({group.rows} rows)"
-
-
-@dataclass(frozen=True, slots=True)
-class _Columns:
-    """A set of signals column by column, and their source."""
-
-    names: Sequence[str]
-    units: Sequence[str]
-    columns: Sequence[Array]
-    roles: Mapping[str, str]
-    form: str
-
-
-def _columns(group: _Group) -> _Columns:
+def _table(path: Path, group: _Group) -> Table:
+    """Return a set of signals column by column; its source is the form that they have."""
     one, turned = group.members[0]
     if len(group.members) == 1 and group.clock is None and turned.shape[1] > 1:
-        return _of_matrix(one, turned)
+        return _of_matrix(path, one, turned)
     names, units, columns = [], [], []
     if group.clock is not None:
         names.append(group.clock.name)
@@ -178,10 +157,10 @@ def _columns(group: _Group) -> _Columns:
     if group.clock is not None:
         form += f" over the clock {group.clock.name}"
         roles["time"] = group.clock.name
-    return _Columns(_unique(names), units, columns, roles, form)
+    return Table(str(path), form, tuple(_unique(names)), tuple(units), tuple(columns), roles=roles)
 
 
-def _of_matrix(one: Variable, turned: Array) -> _Columns:
+def _of_matrix(path: Path, one: Variable, turned: Array) -> Table:
     """Return the columns of a matrix by number, the first as clock or index if it rises throughout."""
     names = [str(number) for number in range(1, turned.shape[1] + 1)]
     lying = "columns" if one.values.shape[0] == len(turned) else "rows"
@@ -194,7 +173,8 @@ def _of_matrix(one: Variable, turned: Array) -> _Columns:
     elif np.all(steps > 0.0):
         roles["time"] = "1"
         form += ", the first is the clock"
-    return _Columns(names, [one.unit] * len(names), list(turned.T), roles, form)
+    units = (one.unit,) * len(names)
+    return Table(str(path), form, tuple(names), units, tuple(turned.T), roles=roles)
 
 
 def _unique(names: Sequence[str]) -> list[str]:

@@ -32,7 +32,6 @@ class Suggestion:
 
     @property
     def options(self) -> str:
-        """The options on a command line."""
         section = self.section
         values = [
             ("--columns", _pairs(section.columns)),

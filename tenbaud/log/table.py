@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from channel.codec.signals import unit_suffix
 from channel.errors import TenbaudError
-from tenbaud.log.units import bare_name
+from tenbaud.log.units import bare_name, stem_of
 
 Array = npt.NDArray[np.float64]
 Wanted = Callable[[Sequence[str], Sequence[str], Mapping[str, str]], Sequence[int]]
@@ -58,11 +59,9 @@ class Table:
     """where the format itself knows: "time", "index", or the name of a signal, to a column"""
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.columns[0]) if self.columns else 0
 
     def find(self, wanted: str) -> int:
-        """Return the place of a column by name or number."""
         return find_column(self.path, self.names, wanted)
 
     def only(self, wanted: Wanted | None) -> Table:
@@ -125,3 +124,28 @@ def listed(names: Sequence[str]) -> str:
     """Return the columns with their numbers, for people."""
     shown = [f"{at} {name}" if name != str(at) else name for at, name in enumerate(names[:40], 1)]
     return ", ".join(shown) + (f" and {len(names) - 40} more" if len(names) > 40 else "") or "none"
+
+
+def export_roles(names: Sequence[str], units: Sequence[str]) -> Mapping[str, str]:
+    """Return the measured and applied columns of an exported flight; {} for another file.
+
+    Keys are `time`, `out:NAME` and `in:NAME`. A unit is the end of a column's name in some forms.
+    """
+    plain = [
+        name.removesuffix(f"_{unit_suffix(unit)}") if unit else name
+        for name, unit in zip(names, units, strict=True)
+    ]
+    if not any(one.startswith("error_coded") for one in plain) or stem_of(names[0]) not in (
+        "tick",
+        "time",
+    ):
+        return {}
+    roles = {"time": names[1] if names[0] == "tick" else names[0]}
+    for at, name in enumerate(plain):
+        if name == "measured":  # of the only output, which is beside it
+            roles[f"out:{plain[at - 1]}"] = names[at]
+        elif name.removeprefix("measured_") in plain and name.startswith("measured_"):
+            roles[f"out:{name.removeprefix('measured_')}"] = names[at]
+        elif f"{name}_command" in plain:
+            roles[f"in:{name}"] = names[at]
+    return roles

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tenbaud.log.dialect import DATE, MIXED, Dialect, find_dialect
-from tenbaud.log.export import export_roles
-from tenbaud.log.table import Array, LogError, Table, Wanted
+from tenbaud.log.table import Array, LogError, Table, Wanted, export_roles
 from tenbaud.log.units import DATE_TIME
 
 if TYPE_CHECKING:
@@ -67,7 +66,6 @@ class _Column:
         self._rows = 0
 
     def take(self, cells: pd.Series[Any]) -> None:
-        """Add the cells of a chunk."""
         import pandas as pd
 
         if cells.dtype.kind in "biuf" and not self.began:

@@ -59,24 +59,15 @@ class Bench:
         """Fly every record with the constants of a configuration; ConfigError where they are none."""
         agreement = shared_parts(config)
         observer = observer_arrays(build_observer(agreement))
-        parts = [self._points[core :: self._cores] for core in range(self._cores)]
-        flown = [_fly(parts[0], agreement, observer)] if self._cores == 1 else []
-        if not flown:
-            with ThreadPoolExecutor(self._cores) as pool:
-                flown = list(pool.map(lambda part: _fly(part, agreement, observer), parts))
-        places = range(len(self._points))
-        return [flown[place % self._cores][place // self._cores] for place in places]
+        with ThreadPoolExecutor(self._cores) as pool:
+            return list(pool.map(lambda point: _fly(point, agreement, observer), self._points))
 
 
-def _fly(
-    points: Sequence[CompiledPoint], agreement: Agreement, observer: dict[str, Any]
-) -> list[FlightFigures]:
-    flown = []
-    for point in points:
-        point.use(agreement, observer)
-        try:
-            flown.append(point.fly(agreement.config.seed)[0])
-        except Uncommon as error:
-            flown.append(FlightFigures(str(error), "compiled", "", (), 0, 0, 0))
+def _fly(point: CompiledPoint, agreement: Agreement, observer: dict[str, Any]) -> FlightFigures:
+    point.use(agreement, observer)
+    try:
+        return point.fly(agreement.config.seed)[0]
+    except Uncommon as error:
+        return FlightFigures(str(error), "compiled", "", (), 0, 0, 0)
+    finally:
         point.rest()
-    return flown

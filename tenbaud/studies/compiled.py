@@ -205,14 +205,12 @@ class MachineCode:
 
     @classmethod
     def from_function(cls, function: FunctionType, _file: str) -> MachineCode:
-        """Return the place of this function, whose name numba adds."""
         return cls(function.__code__.co_firstlineno)
 
     def ensure_cache_path(self) -> None:
         """Do nothing: the folder is there."""
 
     def get_cache_path(self) -> str:
-        """Return the folder of all functions of these sources."""
         return str(_cache_folder())
 
     def get_source_stamp(self) -> str:
@@ -220,7 +218,6 @@ class MachineCode:
         return ""
 
     def get_disambiguator(self) -> str:
-        """Return the line, which distinguishes functions of one name in a file."""
         return str(self._line)
 
 

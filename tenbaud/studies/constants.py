@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
-from tenbaud.studies.settings import StudyError, check_name
+from tenbaud.studies.settings import StudyError, at, check_name
 from tenbaud.studies.study_file import Range, described
 
 BANDWIDTH = "transmitter.rate_observer_bandwidth_rad_s"
@@ -150,17 +150,9 @@ def _check_constant(config: FlightConfig, name: str) -> None:
 
 def present(config: FlightConfig, name: str) -> float:
     """Return what a constant is now; StudyError where there is none that can be fitted."""
-    here: Any = config
-    for part in name.split("."):
-        try:
-            if isinstance(here, dict):
-                here = here[part]
-            else:
-                here = here[int(part)] if part.isdigit() else getattr(here, part, None)
-        except (IndexError, KeyError, TypeError):
-            here = None
-        if here is None:
-            raise StudyError(f"{name} is not a constant of the coder and model that are configured")
+    here = at(config.model_dump(mode="json"), name)
+    if here is None:
+        raise StudyError(f"{name} is not a constant of the coder and model that are configured")
     if isinstance(here, bool) or not isinstance(here, int | float):
         raise StudyError(f"{name} is not a number, so it cannot be fitted")
     if isinstance(here, int):

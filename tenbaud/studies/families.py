@@ -7,28 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TypeAlias
 
 from tenbaud.config.coders import DirectionCoderSection, HistoryCoderSection
 from tenbaud.config.load import load_config
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
-
-
-class Family(Protocol):
-    """Configurations that a search moves in."""
-
-    scan: Sequence[Sequence[float]]
-    """points to begin with; the best one is where the search starts"""
-
-    def at(self, shares: Sequence[float]) -> FlightConfig:
-        """Return the configuration of a point; ConfigError where there is none."""
-
-
-def family_of(config: FlightConfig) -> Family:
-    """Return the coders that suit the model of a configuration."""
-    return HistoryFamily(config) if config.model.kind == "pitch" else DirectionFamily(config)
 
 
 class HistoryFamily:
@@ -45,11 +30,11 @@ class HistoryFamily:
         # Beyond this a rate is the encoder's steps.
         self._fastest = min(200.0, 1.0 / config.timing.tick_s)
         self.scan: Sequence[Sequence[float]]
+        """points to begin with; the best one is where the search starts"""
         middle = (0.5, 0.5, 0.5, 0.25)
         self.scan = tuple((*middle, size / 12.0, 0.3, 0.6) for size in range(2, 12))
 
     def at(self, shares: Sequence[float]) -> FlightConfig:
-        """Return the coder of seven shares."""
         angle, rate, growth, run, smallest, exponent, bandwidth = shares
         assert isinstance(self._table, HistoryCoderSection)
         rows = [
@@ -92,7 +77,6 @@ class DirectionFamily:
         self.scan = tuple((size / 20.0, 0.5, 0.5, 0.5) for size in range(2, 19))
 
     def at(self, shares: Sequence[float]) -> FlightConfig:
-        """Return the coder of four shares."""
         strength = between(*self.STRENGTH, shares[0])
         coder = self._coder.model_copy(
             update={
@@ -108,6 +92,14 @@ class DirectionFamily:
             densities = tuple([strength * one for one in model.densities])
             model = model.model_copy(update={"densities": densities})
         return self._config.model_copy(update={"coder": coder, "model": model})
+
+
+Family: TypeAlias = HistoryFamily | DirectionFamily
+
+
+def family_of(config: FlightConfig) -> Family:
+    """Return the coders that suit the model of a configuration."""
+    return HistoryFamily(config) if config.model.kind == "pitch" else DirectionFamily(config)
 
 
 def between(least: float, most: float, share: float) -> float:

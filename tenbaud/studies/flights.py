@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,49 +40,25 @@ from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import window_ticks
 
 
-@dataclass(slots=True)
-class Trace:
-    """States of a compiled flight, for comparisons."""
-
-    models: Any
-    coders: Any
-
-
-@dataclass(slots=True)
 class CompiledPoint:
     """One configuration, ready to be flown with any seed.
 
     Building it raises Uncommon where only the nodes can fly it, ConfigError where nobody can.
+    `scored_from`: the tick from which errors count, where it is not the usual one.
     """
 
-    config: FlightConfig
-    scored_from: int | None = None
-    """the tick from which errors count, where it is not the usual one"""
-    agreement: Agreement = field(init=False)
-    numbers: Numbers = field(init=False)
-    constants: Any = field(init=False)
-    targets: Any = field(init=False)
-    _log: FlightLog | None = field(init=False, default=None)
-    _clean: Any = field(init=False, default=None)
-    _plant: Any = field(init=False)
-    _pushed: bool = field(init=False, default=False)
-    """whether the plant has a disturbance, so that every seed has a plant of its own"""
-    _flight: Any = field(init=False)
-    _start: Any = field(init=False)
-    _timeout_ticks: int = field(init=False)
-    steady: dict[str, Any] = field(init=False)
-    """arrays that do not depend on the seed"""
-    _work: Work = field(init=False)
+    _log: FlightLog | None = None
+    _clean: Any = None
 
-    def __post_init__(self) -> None:
+    def __init__(self, config: FlightConfig, scored_from: int | None = None) -> None:
         """Build all that does not depend on the seed."""
-        config = self.config
-        self.agreement = agreement = replace(shared_parts(config), scored_from=self.scored_from)
+        self.config, self.scored_from = config, scored_from
+        self.agreement = agreement = replace(shared_parts(config), scored_from=scored_from)
         codec, signals, tick_s = agreement.codec, agreement.signals, config.timing.tick_s
         _require_ordinary(config, codec)
         ticks = agreement.flight_ticks
         replay = config.transmitter.rig == "replay"
-        self._plant = AtRest()
+        self._plant: Any = AtRest()
         if replay:
             self._log = read_flight_log(config, signals)
             ticks = min(ticks, len(self._log))
@@ -91,6 +67,7 @@ class CompiledPoint:
         parts = plant_parts(self._plant, len(signals.outputs))
         pushes = self._plant.pushes(2)
         self._pushed = len(pushes) > 1
+        """whether the plant has a disturbance, so that every seed has a plant of its own"""
         law, law_constants = law_of(build_controller(config, model=codec.model), signals, tick_s)
         self.numbers = Numbers(
             ticks=ticks,
@@ -102,7 +79,7 @@ class CompiledPoint:
             uses_rates=codec.uses_rates,
             watch=sys.maxsize if replay else window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
         )
-        self.constants = (
+        self.constants: Any = (
             arrays_of(codec.model.constants),  # type: ignore[attr-defined]
             arrays_of(codec.coder.constants),  # type: ignore[attr-defined]
             parts.constants,
@@ -112,11 +89,12 @@ class CompiledPoint:
         self._flight = compiled_flight(codec, signals, law, parts, pushes.shape[1])
         self._start = np.array(parts.start)
         self._timeout_ticks = guard_settings(agreement).timeout_ticks
-        self.steady = (
+        self.steady: dict[str, Any] = (
             signal_arrays(agreement)
             | observer_arrays(build_observer(agreement))
             | recorded_arrays(self._log, self._ahead, signals)
         )
+        """arrays that do not depend on the seed"""
         self._work = work_arrays(codec, signals, self._samples, ticks, self._ahead)
 
     @property
@@ -128,10 +106,10 @@ class CompiledPoint:
         """Return how many ticks have a command."""
         return self._samples * self.numbers.per_sample + self.numbers.lead
 
-    def fly(self, seed: int) -> tuple[FlightFigures, Trace]:
+    def fly(self, seed: int) -> tuple[FlightFigures, Work]:
         """Fly with one seed; Uncommon when the flight leaves the ordinary course.
 
-        The trace holds until the next flight of this point.
+        What it wrote holds until the next flight of this point.
         """
         agreement = self.agreement
         if seed != self.config.seed:
@@ -151,7 +129,7 @@ class CompiledPoint:
             raise Uncommon("the flight left its ordinary course")
         if faults_of(self._counts(schedule)):
             raise Uncommon("what does not count as flown, for the reason that the nodes give")
-        return self._figures(schedule), Trace(work.models, work.coders)
+        return self._figures(schedule), work
 
     def on(self, log: FlightLog, scored_from: int) -> CompiledPoint:
         """Return this point on another record, which is no longer than its own; `use` comes first."""
@@ -192,7 +170,6 @@ class CompiledPoint:
         )
 
     def _figures(self, schedule: Schedule) -> FlightFigures:
-        """Return the figures that a study keeps of the flight."""
         numbers, work = self.numbers, self._work
         coded, live = work.counted.tolist()
         followed = numbers.ticks - numbers.window_start
@@ -228,7 +205,6 @@ class CompiledPoint:
         return clean
 
     def given(self, schedule: Schedule, agreement: Agreement) -> Given:
-        """Return the inputs of a flight."""
         plant = self._plant
         if self._pushed and agreement is not self.agreement:
             plant = build_plant(agreement.config, agreement.config.timing.tick_s, agreement.signals)

@@ -19,7 +19,6 @@ class AtRest:
     state = constants = (0.0,)
 
     def pushes(self, steps: int) -> Any:
-        """Return one row for nothing."""
         return np.zeros((1, 1))
 
     @staticmethod

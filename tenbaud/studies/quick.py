@@ -7,7 +7,7 @@ record (`records`), with a bounded number of flights.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -21,10 +21,10 @@ from tenbaud.studies.bench import Bench
 from tenbaud.studies.constants import BANDWIDTH, changed
 from tenbaud.studies.families import Family, family_of
 from tenbaud.studies.figures import shared_parts
-from tenbaud.studies.judging import NO_CONSTANTS, PHASES_MAX, score, weights_of
+from tenbaud.studies.judging import PHASES_MAX, Judged, score, weights_of
 from tenbaud.studies.records import Augment, Variant, liveliest, phases_of, rows, variants_of
 from tenbaud.studies.schedule import Uncommon
-from tenbaud.studies.search import minimise
+from tenbaud.studies.search import OnEvaluation, Spent, Trials, minimise
 from tenbaud.studies.settings import StudyError
 
 WINDOW_TICKS = 10_000
@@ -35,8 +35,6 @@ EVALUATIONS_MAX = 400
 AUGMENT = Augment(phases=3)
 SAMPLES_MIN = 20
 """of the part of a record that constants can be fitted to"""
-
-OnEvaluation = Callable[[int, float], None]
 
 
 class QuickCoder(NamedTuple):
@@ -55,7 +53,6 @@ def quick_coder(
     *,
     until_s: float | None = None,
     on_evaluation: OnEvaluation = lambda _count, _error: None,
-    cores: int = 1,
 ) -> QuickCoder:
     """Return coder constants for the model of a configuration on its recorded flight.
 
@@ -82,8 +79,8 @@ def quick_coder(
             "needed to fit coder constants"
         )
     try:
-        found = _Fit(config, log, family, on_evaluation, cores).best()
-        bench = Bench(found, [Variant(log, 1.0, 1.0)], phases_of(found, PHASES_MAX), 0, cores)
+        found = _best(config, log, family, on_evaluation)
+        bench = Bench(found, [Variant(log, 1.0, 1.0)], phases_of(found, PHASES_MAX), 0, 1)
     except Uncommon as error:
         raise StudyError(f"no coder constants are fitted for {error}") from error
     flown = bench.fly(found)
@@ -103,57 +100,31 @@ def quick_coder(
     )
 
 
-class _Spent(Exception):
-    """The record was flown often enough."""
+def _best(
+    config: FlightConfig, log: FlightLog, family: Family, on_evaluation: OnEvaluation
+) -> FlightConfig:
+    """Return the configuration of a family with the least error; StudyError where none flies."""
+    variants = variants_of(config, shared_parts(config).codec, log, AUGMENT)
+    bench = Bench(config, variants, phases_of(config, AUGMENT.phases), 0, 1)
+    weights = weights_of(config)
 
+    def judge(tried: FlightConfig) -> Judged:
+        return score(bench.fly(tried), bench.sizes, weights)
 
-class _Fit:
-    """The flights of one fit, and the best configuration among them."""
+    budget = min(BUDGET_TICKS // (len(log) * len(bench.sizes)), EVALUATIONS_MAX)
+    most = max(2 * len(family.scan), budget)
+    none = Judged(math.inf, 0, 0, "")
+    trials = Trials(judge, most, on_evaluation, none, config, math.inf, keeps_lost=False)
 
-    def __init__(
-        self,
-        config: FlightConfig,
-        log: FlightLog,
-        family: Family,
-        on_evaluation: OnEvaluation,
-        cores: int,
-    ) -> None:
-        self._family = family
-        self._on_evaluation = on_evaluation
-        variants = variants_of(config, shared_parts(config).codec, log, AUGMENT)
-        self._bench = Bench(config, variants, phases_of(config, AUGMENT.phases), 0, cores)
-        self._weights = weights_of(config)
-        budget = BUDGET_TICKS // (len(log) * len(self._bench.sizes))
-        self._left = max(2 * len(family.scan), min(budget, EVALUATIONS_MAX))
-        self._count = 0
-        self._least = math.inf
-        self._found: FlightConfig | None = None
-        self._reason = ""
+    def error_at(shares: Sequence[float]) -> float:
+        return trials.error_of(lambda: family.at(shares))
 
-    def best(self) -> FlightConfig:
-        """Return the configuration with the least error; StudyError where none flies."""
-        errors = [self._error_at(one) for one in self._family.scan]
-        if self._found is None:
-            raise StudyError(
-                f"no coder constants fly this record with this model: {self._reason}; check the model, "
-                "the units and the signs of the record"
-            )
-        with suppress(_Spent):
-            minimise(self._error_at, self._family.scan[int(np.argmin(errors))], AUGMENT.seed)
-        return self._found
-
-    def _error_at(self, shares: Sequence[float]) -> float:
-        if self._count >= self._left:
-            raise _Spent
-        self._count += 1
-        try:
-            config = self._family.at(shares)
-            judged = score(self._bench.fly(config), self._bench.sizes, self._weights)
-        except NO_CONSTANTS as error:
-            self._reason = str(error)
-            return math.inf
-        self._reason = judged.reason or self._reason
-        if judged.rms_rad < self._least and not judged.lost:
-            self._least, self._found = judged.rms_rad, config
-        self._on_evaluation(self._count, self._least)
-        return judged.rms_rad
+    errors = [error_at(one) for one in family.scan]
+    if trials.best is none:
+        raise StudyError(
+            f"no coder constants fly this record with this model: {trials.last_reason}; check the "
+            "model, the units and the signs of the record"
+        )
+    with suppress(Spent):
+        minimise(error_at, family.scan[int(np.argmin(errors))], AUGMENT.seed)
+    return trials.found

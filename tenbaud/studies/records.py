@@ -18,7 +18,7 @@ from scipy.signal import dlsim
 from channel.codec.codec import Codec
 from channel.codec.signals import signals_of
 from channel.flight_log import FlightLog
-from plant_sim.encoder import Encoder, OutputReader
+from plant_sim.encoder import OutputReader
 from tenbaud.bounds.linear import Matrix
 from tenbaud.build.signals import build_encoders
 from tenbaud.config.schema import FlightConfig
@@ -45,7 +45,6 @@ class Augment:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse invalid settings."""
         if not self.scales or min(self.scales) <= 0.0:
             raise StudyError(f"scales are sizes above 0, got {self.scales}")
         if self.shoves < 0.0 or self.phases < 1:
@@ -105,9 +104,8 @@ def _read(encoders: Sequence[OutputReader], values: Matrix) -> Matrix:
     """Return outputs as their encoders read them."""
     read = values.copy()
     for one, column in zip(encoders, read.T, strict=True):
-        if isinstance(one, Encoder):
-            step = one.turn / one.counts_per_turn
-            column[:] = np.rint(column / step) * step
+        if one.step:
+            column[:] = np.rint(column / one.step) * one.step
     return read
 
 

@@ -12,7 +12,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from multiprocessing import get_context, parent_process
@@ -80,19 +80,10 @@ def _in_one_pool(left: dict[int, ChunkTask], workers: int) -> Iterator[ChunkResu
     """Fly the missing chunks, in the order of completion; BrokenProcessPool when a process died."""
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
     try:
-        waiting = iter(list(left.values()))
-        flying: set[Future[ChunkResult]] = set()
-        while True:
-            # A few ahead, so that no process waits for the next and little is lost with a pool.
-            while len(flying) < 2 * workers and (task := next(waiting, None)) is not None:
-                flying.add(pool.submit(fly_chunk, task))
-            if not flying:
-                return
-            finished, flying = wait(flying, return_when=FIRST_COMPLETED)
-            for future in finished:
-                result = future.result()
-                del left[result.chunk]
-                yield result
+        for future in as_completed([pool.submit(fly_chunk, task) for task in left.values()]):
+            result = future.result()
+            del left[result.chunk]
+            yield result
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 

@@ -138,13 +138,16 @@ def _put_texts(config: FlightConfig, values: dict[str, Any], texts: dict[str, An
             case _:
                 more = f"{'up:' if name == 'flip' else ''}{name}={value!r}" if value else ""
         place = TEXTS[name]
-        put(values, place, ",".join(filter(None, (_at(values, place) or text, more))))
+        put(values, place, ",".join(filter(None, (at(values, place) or text, more))))
 
 
-def _at(values: Any, name: str) -> Any:
-    """Return the field of a dotted name in nested sections, None where there is none."""
+def at(values: Any, name: str) -> Any:
+    """Return what a dotted name stands for in nested sections and lists, None where there is none."""
     for part in name.split("."):
-        values = values.get(part) if isinstance(values, dict) else None
+        try:
+            values = values[int(part) if isinstance(values, list) else part]
+        except (LookupError, TypeError, ValueError):
+            return None
     return values
 
 
@@ -152,9 +155,9 @@ def _with_entry(
     config: FlightConfig, values: dict[str, Any], field: str, index: int, value: object
 ) -> list[Any]:
     """Return a list of the configuration with one entry changed."""
-    here = _at(values, field)
+    here = at(values, field)
     if not isinstance(here, list):
-        here = _at(config.model_dump(mode="json"), field)
+        here = at(config.model_dump(mode="json"), field)
     if not isinstance(here, list) or index >= len(here):
         size = f"has {len(here)} entries" if isinstance(here, list) else "is no list"
         raise StudyError(f"{field}.{index} cannot be swept: {field} {size}")

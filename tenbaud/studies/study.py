@@ -73,11 +73,9 @@ class Study:
 
     @property
     def chunks(self) -> int:
-        """Return how many chunks they make."""
         return -(-self.flights // self.file.chunk_flights)
 
     def chunk(self, index: int) -> range:
-        """Return the numbers of a chunk's flights."""
         size = self.file.chunk_flights
         return range(index * size, min((index + 1) * size, self.flights))
 

@@ -48,7 +48,6 @@ class Results:
         return done
 
     def write(self, result: ChunkResult) -> None:
-        """Keep a chunk's figures."""
         import pyarrow as pa
 
         columns: dict[str, list[Any]] = {"flight": [], "point": [], "seed": []}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -14,20 +13,10 @@ from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.constants import BANDWIDTH, present
 from tenbaud.studies.figures import shared_parts
-from tenbaud.studies.judging import (
-    NO_CONSTANTS,
-    PENALTY_RAD,
-    Judge,
-    Judged,
-    Tuning,
-    is_worse,
-)
-from tenbaud.studies.search import minimise
+from tenbaud.studies.judging import PENALTY_RAD, Judge, Tuning, is_worse
+from tenbaud.studies.search import OnEvaluation, Spent, Trials, minimise
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study_file import Range
-
-OnEvaluation = Callable[[int, float], None]
-"""(sets of constants flown, smallest error so far)"""
 
 
 class Tuned(NamedTuple):
@@ -80,11 +69,25 @@ def tune(
             f"from: {before.reason}"
         )
     before_test = judge(start, train=False)
-    trials = _Trials(tuning, judge, on_evaluation, should_stop, start, before)
+    trials = Trials(
+        lambda values: judge(values, train=True),
+        tuning.evaluations,
+        on_evaluation,
+        before,
+        start,
+        PENALTY_RAD,
+        should_stop,
+    )
     trials.note(start, before)
-    with suppress(_Spent):
-        _search(trials.error_at, [_share(tuning.free[name], start[name]) for name in start], tuning)
-    after_test = judge(trials.values, train=False)
+
+    def error_at(shares: Iterable[float]) -> float:
+        pairs = zip(tuning.free.items(), shares, strict=True)
+        values = {name: one.at(min(max(float(share), 0.0), 1.0)) for (name, one), share in pairs}
+        return trials.error_of(lambda: values)
+
+    with suppress(Spent):
+        _search(error_at, [_share(tuning.free[name], start[name]) for name in start], tuning)
+    after_test = judge(trials.found, train=False)
     judged = {
         "train_before": before,
         "test_before": before_test,
@@ -93,7 +96,7 @@ def tune(
     }
     train_what, test_what = _described(config, tuning, judge)
     return Tuned(
-        values=trials.values,
+        values=trials.found,
         **{name: one.rms_rad for name, one in judged.items()},
         evaluations=trials.count,
         penalised=trials.penalised,
@@ -104,68 +107,17 @@ def tune(
         test_largest=after_test.largest,
         test_amplitude=after_test.amplitude,
         over_fitted=is_worse(before_test, after_test),
-        failure=trials.failure if trials.values == start else "",
+        failure=_failure(trials) if trials.found == start else "",
         units=units_of(config),
     )
 
 
-class _Spent(Exception):
-    """The search has flown the requested number of sets of constants, or was stopped."""
-
-
-@dataclass(slots=True)
-class _Trials:
-    """The trials of the search, and the best one."""
-
-    tuning: Tuning
-    judge: Judge
-    on_evaluation: OnEvaluation
-    should_stop: Callable[[], bool]
-    values: dict[str, float]
-    best: Judged
-    count: int = 0
-    penalised: int = 0
-    last_reason: str = ""
-    """why the last of those had no figures"""
-    names: list[str] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Keep the constants in one order."""
-        self.names = list(self.tuning.free)
-
-    def error_at(self, shares: Iterable[float]) -> float:
-        """Return the error of constants, each a share of its range; _Spent when it is enough."""
-        if self.count >= self.tuning.evaluations or self.should_stop():
-            raise _Spent
-        free = self.tuning.free
-        values = {
-            name: free[name].at(min(max(float(share), 0.0), 1.0))
-            for name, share in zip(self.names, shares, strict=True)
-        }
-        try:
-            judged = self.judge(values, train=True)
-        except NO_CONSTANTS as error:
-            # Some corners of the ranges are no coder at all; how many, the report says.
-            judged = Judged(PENALTY_RAD, 1, 1, str(error))
-        self.note(values, judged)
-        return judged.rms_rad
-
-    def note(self, values: dict[str, float], judged: Judged) -> None:
-        """Count one set of constants, and keep it if it is the best."""
-        self.count += 1
-        self.penalised += judged.lost > 0
-        self.last_reason = judged.reason or self.last_reason
-        if judged.rms_rad < self.best.rms_rad:
-            self.best, self.values = judged, values
-        self.on_evaluation(self.count, self.best.rms_rad)
-
-    @property
-    def failure(self) -> str:
-        """Return why nothing better than the start was found."""
-        tried = self.count - 1
-        if tried and self.penalised >= tried:
-            return f"none of the {tried} parameter sets tried has figures: {self.last_reason}"
-        return f"none of the {tried} parameter sets tried is better than the one configured"
+def _failure(trials: Trials[dict[str, float]]) -> str:
+    """Return why nothing better than the start was found."""
+    tried = trials.count - 1
+    if tried and trials.penalised >= tried:
+        return f"none of the {tried} parameter sets tried has figures: {trials.last_reason}"
+    return f"none of the {tried} parameter sets tried is better than the one configured"
 
 
 def _search(error_at: Callable[[Any], float], start: list[float], tuning: Tuning) -> None:

@@ -6,7 +6,9 @@ import math
 
 import pytest
 
-from plant_sim.encoder import QUANSER_PITCH, TEN_BITS, Encoder
+from plant_sim.encoder import QUANSER_PITCH, Encoder
+
+TEN_BITS = Encoder(1024)
 
 
 def test_presets_have_the_counts_of_their_hardware() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from plant_sim.disturbance import WhiteTorque
-from plant_sim.encoder import TEN_BITS
+from plant_sim.encoder import Encoder
 from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.pitch import quiescent_angle
 from plant_sim.identification.record import Record
@@ -13,6 +13,7 @@ from plant_sim.pitch import PitchParameters, PitchPlant
 
 STEP_S = 0.01
 TRUE = PitchParameters()
+TEN_BITS = Encoder(1024)
 EXCITATION_A = "square:0.2,0,2.5"
 EXCITATION_B = "square:0.25,0.1,3"
 

@@ -23,7 +23,7 @@ from tenbaud.bounds.floor import (
 )
 from tenbaud.bounds.linear import LinearModel, linear_model, reached, sampled
 from tenbaud.design.described import plant_of, plant_section
-from tenbaud.design.floors import floors
+from tenbaud.design.plant import floors
 
 PENDULUM = linear_model([[0.0, 1.0], [7.3198**2, 0.0]], [[0.0, 0.0], [0.0, 1e-3]], [1.0, 0.0])
 

@@ -10,8 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.pitch import PitchStructure
-from plant_sim.identification.structures import parse_linear
+from plant_sim.identification.structures import PitchStructure, parse_linear
 from tenbaud import identify, load_preset
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config

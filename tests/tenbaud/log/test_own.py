@@ -11,10 +11,9 @@ import pytest
 from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud import Run
 from tenbaud.config.schema import FlightLogSection
-from tenbaud.log.export import export_roles
 from tenbaud.log.read import read_log
 from tenbaud.log.reader import read_table
-from tenbaud.log.table import LogError
+from tenbaud.log.table import LogError, export_roles
 from tenbaud.recording.convert import FORMS, convert
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.writer import McapRecorder

@@ -13,8 +13,7 @@ from plant_sim.disturbance import WhiteTorque
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters as PlantParameters
 from plant_sim.pitch import PitchPlant
-from plant_sim.zero_order_hold import discretised
-from tenbaud.bounds.linear import van_loan
+from plant_sim.zero_order_hold import discretised, van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.observer import linear_observer
 from tests.channel.codec.two_axes import TwoAxes

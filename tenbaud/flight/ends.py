@@ -279,7 +279,7 @@ def _narrow(run: TransmitterRun) -> Status:
     listed = run.node.session.following.hypotheses  # type: ignore[attr-defined]
     now = {
         "unconfirmed": listed.next_heard - listed.next_confirmed,
-        "copies": listed.size,
+        "hypotheses": listed.size,
         "baud": run.endpoint.down_baud.baud,
     }
     return {"narrow": part["narrow"] | now}

@@ -50,42 +50,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from channel.codec.codec import Codec
-    from channel.protocol.terms import Terms
-    from receiver.session.session import ReceiverSession
-    from tenbaud import coders, controllers, errors, models, plants
-    from tenbaud.build.preset import Preset, load_preset
-    from tenbaud.config.load import preset_names
-    from tenbaud.flight.fly import fly
-    from tenbaud.flight.memory import MemoryFlight
-    from tenbaud.flight.memory_result import FlightResult
-    from tenbaud.identification.api import identify
-    from tenbaud.recording.memory import MemoryRecorder
-    from tenbaud.recording.run import Run
-    from tenbaud.recording.side_by_side import compare
-    from transmitter.session.session import TransmitterSession
-
-__all__ = [
-    "Codec",
-    "FlightResult",
-    "MemoryFlight",
-    "MemoryRecorder",
-    "Preset",
-    "ReceiverSession",
-    "Run",
-    "Terms",
-    "TransmitterSession",
-    "coders",
-    "compare",
-    "controllers",
-    "errors",
-    "fly",
-    "identify",
-    "load_preset",
-    "models",
-    "plants",
-    "preset_names",
-]
+    from channel.codec.codec import Codec as Codec
+    from channel.protocol.terms import Terms as Terms
+    from receiver.session.session import ReceiverSession as ReceiverSession
+    from tenbaud import coders as coders
+    from tenbaud import controllers as controllers
+    from tenbaud import errors as errors
+    from tenbaud import models as models
+    from tenbaud import plants as plants
+    from tenbaud.build.preset import Preset as Preset
+    from tenbaud.build.preset import load_preset as load_preset
+    from tenbaud.config.load import preset_names as preset_names
+    from tenbaud.flight.fly import fly as fly
+    from tenbaud.flight.memory import MemoryFlight as MemoryFlight
+    from tenbaud.flight.memory_result import FlightResult as FlightResult
+    from tenbaud.identification.api import identify as identify
+    from tenbaud.recording.memory import MemoryRecorder as MemoryRecorder
+    from tenbaud.recording.run import Run as Run
+    from tenbaud.recording.side_by_side import compare as compare
+    from transmitter.session.session import TransmitterSession as TransmitterSession
 
 _HOMES = {
     "Codec": "channel.codec.codec",
@@ -103,7 +86,8 @@ _HOMES = {
     "load_preset": "tenbaud.build.preset",
     "preset_names": "tenbaud.config.load",
 }
-"""The module of each name; the others of `__all__` are modules of this package."""
+"""The module of each name."""
+__all__ = [*_HOMES, "coders", "controllers", "errors", "models", "plants"]
 
 
 def __getattr__(name: str) -> object:

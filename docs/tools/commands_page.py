@@ -5,9 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterator
-from enum import Enum
 from types import NoneType
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
 from typer.models import ArgumentInfo, OptionInfo
@@ -88,8 +87,6 @@ def _rows(callback: Callable[..., Any]) -> Iterator[str]:
             _argument(name, parameter) if isinstance(info, ArgumentInfo) else _option(name, info, kind)
         )
         default = parameter.default
-        if isinstance(default, Enum):
-            default = default.value
         unset = default in (inspect.Parameter.empty, None, False, "") or default is ...
         shown = "" if unset else f"`{default}`"
         meaning = " ".join((info.help or "").split()).replace("|", "\\|").replace("<", "&lt;")
@@ -123,13 +120,13 @@ def _option(name: str, info: OptionInfo, kind: Any) -> str:
     ]
     names = ", ".join(f"`{one}`" for one in declared or ["--" + name.replace("_", "-")])
     several = False
-    while get_args(kind):
+    while get_args(kind) and get_origin(kind) is not Literal:
         several = several or get_origin(kind) is list
         kind = next(part for part in get_args(kind) if part is not NoneType)
     if kind is bool:
         return names
-    if inspect.isclass(kind) and issubclass(kind, Enum):
-        shown = "\\|".join(str(one.value) for one in kind)
+    if get_origin(kind) is Literal:
+        shown = "\\|".join(get_args(kind))
     else:
         shown = {str: "TEXT", float: "NUMBER", int: "WHOLE NUMBER"}.get(kind, "PATH")
     return f"{names} {shown}" + (", repeatable" if several else "")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from channel.codec.codec import Codec, Coder, CoderContext, Model, ModelContext
 from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
 from channel.line.line import bit_rate
+from channel.registry import Registry
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_part
 from tenbaud.config.kinds import CODERS, MODELS, kind_of, model_kind
 from tenbaud.config.schema import FlightConfig
-from tenbaud.config.section import OutsideSection
+from tenbaud.config.section import KindSection, OutsideSection
 
 
 def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
@@ -33,7 +36,8 @@ def unchecked_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     parts = parts or Parts()
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
     model = build_model(config, parts)
-    coder = parts.coder or _build_coder(config, model)
+    context = CoderContext(config.timing.tick_s, config.timing.symbol_period_s, model)
+    coder = parts.coder or _built(config, CODERS, config.coder, context, Coder)
     needs_hold = isinstance(coder, PcmCoder)
     if needs_hold != isinstance(model, HoldModel):
         raise ValueError(
@@ -58,25 +62,19 @@ def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:
         return parts.model
     section = config.model
     context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
-    model: Model
-    if isinstance(section, OutsideSection):
-        model = build_part(config, MODELS, section.kind, context, section.options, Model)
-    else:
-        model = kind_of(MODELS, section.kind).build(section, context)
-        if len(model.initial()) != model.state_size:
-            raise ValueError(
-                f"model.start has {len(model.initial())} numbers, one for each of "
-                f"{model.state_size} states is needed"
-            )
+    model: Model = _built(config, MODELS, section, context, Model)
+    if not isinstance(section, OutsideSection) and len(model.initial()) != model.state_size:
+        raise ValueError(
+            f"model.start has {len(model.initial())} numbers, one for each of {model.state_size} "
+            "states is needed"
+        )
     return model
 
 
-def _build_coder(config: FlightConfig, model: Model) -> Coder:
-    section = config.coder
-    context = CoderContext(config.timing.tick_s, config.timing.symbol_period_s, model)
-    coder: Coder
+def _built(
+    config: FlightConfig, registry: Registry, section: KindSection, context: object, protocol: type
+) -> Any:
+    """Return the part of a section: of a kind that is built in, or from outside."""
     if isinstance(section, OutsideSection):
-        coder = build_part(config, CODERS, section.kind, context, section.options, Coder)
-    else:
-        coder = kind_of(CODERS, section.kind).build(section, context)
-    return coder
+        return build_part(config, registry, section.kind, context, section.options, protocol)
+    return kind_of(registry, section.kind).build(section, context)

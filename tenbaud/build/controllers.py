@@ -20,7 +20,7 @@ from tenbaud.build.references import References, build_references
 from tenbaud.build.signals import build_limits, initial_command
 from tenbaud.config.controllers import PidLoopSection
 from tenbaud.config.kinds import CONTROLLERS
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 
 
@@ -100,7 +100,7 @@ def _loop(
     later: Sequence[PidLoopSection],
 ) -> Loop:
     signals = context.signals
-    try:
+    with config_errors(field):
         place = signals.index("outputs", section.output) if section.output else 0
         output = signals.outputs[place]
         mixing = _mixing(section, signals, [one.output for one in later])
@@ -121,8 +121,6 @@ def _loop(
         constants = PidConstants(*gains.per_tick(context.tick_s, output_unit), mixing, conditional)
         value = _value_of(context, place)
         rate = _rate_of(section, context, place, value)
-    except ValueError as error:
-        raise ConfigError(f"{field}: {error}") from error
     reference = context.references[place] or Constant(0.0, context.tick_s)
     return Loop(constants, reference, place, value, rate)
 

@@ -17,7 +17,6 @@ from channel.codec.downlink.laws import MirroredFeedback, MirroredLoop, Mirrored
 from channel.codec.downlink.layout import Layout, symbols_carried
 from channel.codec.downlink.machine import TwoWay
 from channel.codec.downlink.mirrored import Law, MirroredLaw
-from channel.codec.downlink.scheme import Scheme
 from channel.codec.laws import FeedbackLaw
 from channel.line.impairments import parse_impairments
 from channel.protocol.terms import Terms
@@ -29,7 +28,7 @@ from tenbaud.build.parts import Parts
 from tenbaud.build.references import ANNOUNCED_SAMPLES_MAX
 from tenbaud.build.set_point_ranges import set_point_ranges
 from tenbaud.config.downlink import OF_SCHEME, DownlinkSection, StateLawSection
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 
 DESIGNED = "state_feedback"
@@ -83,29 +82,21 @@ def build_two_way(
     """
     if not terms.is_narrow:
         return BuiltDownlink(None, None)
-    try:
+    with config_errors("the narrow downlink"):
         _require_own_fields(config, terms.is_mirrored)
         layout = _layout(config.downlink, terms)
         build = _mirrored if terms.is_mirrored else _coded
         scheme, description = build(config, codec, terms, layout, parts or Parts())
-        two_way = two_way_of(codec, terms, scheme, layout)
-    except ValueError as error:
-        raise ConfigError(f"the narrow downlink: {error}") from error
+        two_way = TwoWay(
+            codec,
+            scheme,
+            layout,
+            terms.lead_ticks,
+            terms.initial_command,
+            terms.limits.command_max,
+            terms.limits.slew_per_tick,
+        )
     return BuiltDownlink(two_way, {"layout": asdict(layout), **description})
-
-
-def two_way_of(codec: Codec, terms: Terms, scheme: Scheme, layout: Layout) -> TwoWay:
-    """Return the state machine of a codec's flight on these terms."""
-    limits = terms.limits
-    return TwoWay(
-        codec,
-        scheme,
-        layout,
-        terms.lead_ticks,
-        terms.initial_command,
-        limits.command_max,
-        limits.slew_per_tick,
-    )
 
 
 def with_codec(two_way: TwoWay | None, codec: Codec) -> TwoWay | None:

@@ -17,7 +17,7 @@ from tenbaud.build.rig import (
     wired_outputs,
 )
 from tenbaud.build.signals import configured_signals
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis
 from transmitter.rigs.emulator.device import (
@@ -73,15 +73,13 @@ def build_emulator(
     if not 1.0 <= rate <= 5000.0:
         raise ConfigError(f"{rate:g} samples/s: from 1 to 5000")
     axes = _axes(config, form)
-    try:
+    with config_errors():
         faulty = PITCH_CHANNEL if PITCH_CHANNEL in axes else next(iter(axes))
         broken = Faults(faults, config.seed)
         now_ns = time.monotonic_ns()
         device = EmulatedDevice(_body(config, axes), now_ns, watchdog_s, broken, faulty)
         line = parse_line(port, config.transmitter.serial.line_baud)
         speech = _speech(config, form, line_form, polled, axes)
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
     return RigEmulator(device, speech, line, rate)
 
 

@@ -15,7 +15,7 @@ from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
-from channel.line.line import CleanLine, Downlink, Line, Uplink
+from channel.line.line import CleanLine, Downlink, Line
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import SymbolWire, Wire
@@ -26,16 +26,16 @@ from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.downlink import with_codec
 from tenbaud.build.first_contact import require_safe
-from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
+from tenbaud.build.flight import Agreement, ticks_of
 from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
-from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
+from tenbaud.build.liveness import overtaking_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, begin_from, build_references, values_of
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS, model_kind
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 from transmitter.endpoint import TransmitterNode
 from transmitter.guard import Guard, GuardSettings
@@ -97,7 +97,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
     if not codec.uses_rates:
         return None
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
-    try:
+    with config_errors(f"coder.kind = {config.coder.kind!r}"):
         kind = model_kind(config.model)
         # A coder that was designed for a plant stands near its limit: it needs the best view of it.
         is_designed = isinstance(codec.coder, DirectionCoder) and kind is not None and kind.linear
@@ -111,14 +111,6 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
             steps = output_steps(config, agreement.signals)
             return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
-    except ValueError as error:
-        raise ConfigError(f"coder.kind = {config.coder.kind!r}: {error}") from error
-
-
-def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
-    """Return the transmitter's way out onto a line."""
-    line = build_line(agreement, "up", wire)
-    return Uplink(agreement.terms, agreement.codec.coder.alphabet, line, wire, recorder)
 
 
 def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> Line:
@@ -134,10 +126,8 @@ def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
     """Return the codec, corrupted as configured; `live`: it may be corrupted in flight."""
     if not text:
         return SabotagedCodec(codec) if live else codec
-    try:
+    with config_errors():
         return SabotagedCodec(codec, parse_sabotage(text))
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
 
 
 def build_receiver(
@@ -190,24 +180,15 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
             _check_command(config, controller, parts)
 
 
-def check_rig(config: FlightConfig, accept_risk: bool = False, parts: Parts | None = None) -> bool:
+def check_flight(agreement: Agreement, accept_risk: bool = False) -> bool:
     """Return whether motors of a real rig will turn; for a process that opens the rig.
 
-    LinkError where a serial port of the rig is not there, ConfigError where its motors would turn
-    without what `require_safe` asks for.
+    Everything is checked before it starts. ConfigError for parts that cannot be built, a sabotage at a
+    sample that the flight does not have, and motors that would turn without what `require_safe` asks
+    for; LinkError where a serial port of the rig is not there.
     """
-    if config.transmitter.rig == "serial":
-        from channel.links.serial.port import check_port
-
-        section = config.transmitter.serial
-        for port in filter(None, (section.port, section.motor_port)):
-            check_port(port, insecure=True)
-    return require_safe(config, accept_risk, parts)
-
-
-def check_sabotage(agreement: Agreement) -> None:
-    """Raise ConfigError for a sabotage at a sample that the flight does not have."""
     config = agreement.config
+    check_parts(config, agreement.parts)
     samples = agreement.flight_ticks // agreement.terms.ticks_per_sample
     for role, text in (
         ("transmitter", config.transmitter.sabotage),
@@ -215,6 +196,13 @@ def check_sabotage(agreement: Agreement) -> None:
     ):
         if text and parse_sabotage(text).sample >= samples:
             raise ConfigError(f"{role}.sabotage = {text!r}: the flight has only {samples} samples")
+    if config.transmitter.rig == "serial":
+        from channel.links.serial.port import check_port
+
+        section = config.transmitter.serial
+        for port in filter(None, (section.port, section.motor_port)):
+            check_port(port, insecure=True)
+    return require_safe(config, accept_risk, agreement.parts)
 
 
 def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -> None:
@@ -240,9 +228,8 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
     On a recording there is nothing to protect: only a receiver that is gone ends the flight.
     """
     section = agreement.config.transmitter
-    terms = agreement.terms
     recorded = section.rig == "replay"
-    timeout_ticks = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)
+    timeout_ticks = agreement.watchdog_ticks
     if recorded:
         timeout_ticks = ticks_of(agreement.config.link.peer_timeout_s, agreement.config)
     return GuardSettings(

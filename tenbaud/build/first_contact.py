@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from channel.codec.codec import Vector
 from channel.codec.signals import Signal, Signals
 from tenbaud.build.flight import REAL_RIGS
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import reference_sections
-from tenbaud.build.rig import build_device, real_rig_name
+from tenbaud.build.rig import build_axes, build_device, real_rig_name, wired_outputs
 from tenbaud.build.signals import build_limits, configured_signals, per_output, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
-from tenbaud.config.load import ConfigError, toml_text
+from tenbaud.config.load import ConfigError, flattened, toml_text
 from tenbaud.config.schema import FlightConfig
 from tenbaud.log.units import turn_in
 
@@ -37,6 +37,10 @@ DECLARATION_S = 0.5
 """Every sample of this time must say that the device is emulated."""
 LINE_DECLARATION_S = 2.0
 """A device that says it in a line between samples has this long."""
+TURNED_SHARE = 0.9
+"""of the nearer end of the range that an axis was turned through"""
+LEAST_COUNTS = 50
+"""An axis that was turned by less on one side was not turned to its end."""
 
 
 def drives_motors(config: FlightConfig) -> bool:
@@ -92,7 +96,7 @@ def is_emulated(config: FlightConfig, signals: Signals) -> bool:
 
 def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[str]:
     """Yield what a flight lacks, a line each."""
-    soft = soft_limits(config, signals) or (math.inf,) * len(signals.outputs)
+    soft = soft_limits(config, signals)
     open_outputs = [
         one.name for one, most in zip(signals.outputs, soft, strict=True) if most == math.inf
     ]
@@ -111,8 +115,7 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
     for place, (output, section) in enumerate(reference_sections(config, signals)):
         gentle = gentle_limit(output, soft[place])
         for field, what in (("set_point_max", ""), ("set_point_slew_per_s", "/s")):
-            given = per_output(f"limits.{field}", getattr(config.limits, field), signals)
-            value = given[place] if given else math.inf
+            value = per_output(f"limits.{field}", getattr(config.limits, field), signals)[place]
             if section is not None and not value <= gentle:
                 now = "none" if value == math.inf else f"{value:g} {output.unit}{what}"
                 yield (
@@ -136,8 +139,8 @@ def first_settings(
 
     `soft` are soft limits that were found out, infinite where nothing is known.
     """
-    known = soft or soft_limits(config, signals) or (math.inf,) * len(signals.outputs)
-    stops: Mapping[str, tuple[float, float]] = getattr(config.model, "stops", {})
+    known = soft or soft_limits(config, signals)
+    stops = config.model.stops
     limits = [
         most if most < math.inf else _first_soft_limit(one, stops.get(one.name))
         for one, most in zip(signals.outputs, known, strict=True)
@@ -167,11 +170,10 @@ def as_options(settings: Mapping[str, Any]) -> str:
 def motor_lines(config: FlightConfig) -> list[str]:
     """Return the limits of a flight with motors, a line each, for the person who stands beside them."""
     signals = configured_signals(config)
-    free = (math.inf,) * len(signals.outputs)
     columns = (
-        soft_limits(config, signals) or free,
-        per_output("limits.set_point_max", config.limits.set_point_max, signals) or free,
-        per_output("limits.set_point_slew_per_s", config.limits.set_point_slew_per_s, signals) or free,
+        soft_limits(config, signals),
+        per_output("limits.set_point_max", config.limits.set_point_max, signals),
+        per_output("limits.set_point_slew_per_s", config.limits.set_point_slew_per_s, signals),
     )
     lines = []
     for one, soft, largest, slew in zip(signals.outputs, *columns, strict=True):
@@ -205,3 +207,46 @@ def rounded_down(value: float) -> float:
 def _shortest(values: Sequence[float]) -> float | list[float]:
     """Return one number where all are alike."""
     return values[0] if len(set(values)) == 1 else list(values)
+
+
+class TurnedAxis(Protocol):
+    """What was seen of an axis."""
+
+    name: str
+    angle_min_rad: float
+    angle_max_rad: float
+
+
+def proposed(config: FlightConfig, seen: Sequence[TurnedAxis]) -> tuple[dict[str, Any], list[str]]:
+    """Return the settings of a first flight by their full names, and what they do not rest on."""
+    signals = configured_signals(config)
+    by_name = {one.name: one for one in seen}
+    axes = {one.name: one for one in build_axes(config, signals)}
+    soft, not_seen = [], []
+    for name, unit in wired_outputs(signals).items():
+        axis, step = by_name[name], axes[name].turn / axes[name].counts_per_turn
+        reach = min(-axis.angle_min_rad, axis.angle_max_rad)
+        if reach < LEAST_COUNTS * step:
+            soft.append(math.inf)
+            not_seen.append(
+                f"{name} was turned from {axis.angle_min_rad:.3g} to {axis.angle_max_rad:.3g} {unit}, "
+                "not to an end on both sides of 0: its soft limit is a guess"
+            )
+        else:
+            soft.append(rounded_down(TURNED_SHARE * reach))
+    settings = first_settings(config, signals, soft)
+    names = ", ".join(one.name for one in signals.inputs)
+    not_seen += [
+        f"the motors ({names}): they stay disabled, so limits.command_max = "
+        f"{settings['limits.command_max']} is not measured, and neither signs nor outputs are checked",
+        "the emergency stop and the device's watchdog: press the one, unplug the other",
+    ]
+    section = config.transmitter
+    of_rig = {"transmitter": {"rig": section.rig, "bridge": _changed(section.bridge)}}
+    of_rig["transmitter"][section.rig] = _changed(getattr(section, section.rig))
+    return {"preset": config.preset} | dict(flattened(of_rig)) | settings, not_seen
+
+
+def _changed(section: Any) -> dict[str, Any]:
+    changed: dict[str, Any] = section.model_dump(mode="json", exclude_defaults=True)
+    return changed

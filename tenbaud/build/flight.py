@@ -17,11 +17,11 @@ from channel.registry import RegistryError
 from receiver.controllers.base import Controller
 from tenbaud.build.codec import build_codec
 from tenbaud.build.downlink import build_two_way, narrowed_terms
-from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
+from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import longest_period_s
 from tenbaud.build.signals import build_limits, initial_command
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.version import software_version
@@ -71,6 +71,11 @@ class Agreement:
         return round_trip(self.terms, self.faults, self.clock)
 
     @property
+    def watchdog_ticks(self) -> int:
+        """Return the watchdog's time-out, configured or chosen."""
+        return watchdog_ticks(watchdog_wanted_s(self.config), self.terms, self.trip)
+
+    @property
     def desyncs_expected(self) -> float:
         """Return how many lockstep failures were asked for.
 
@@ -104,12 +109,10 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
             f"the {config.transmitter.rig} rig moves in real time and has no virtual clock: "
             "add --clock real"
         )
-    try:
+    with config_errors():
         codec = build_codec(config, parts)
         terms = checked_terms(config, codec, clock, parts.controller)
         two_way, described = build_two_way(config, codec, terms, parts)
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
     shared = config.shared_json(terms.lead_ticks, described)
     identity = Identity(software_version(), shared, numerics_probe(codec, two_way))
     return Agreement(config, clock, codec, terms, identity, parts=parts, two_way=two_way)
@@ -158,6 +161,8 @@ def build_terms(
     )
     terms = narrowed_terms(config, terms, controller)
     terms = kind_of_link(config).terms(config.link, codec, terms)
+    if clock == "virtual":
+        terms = replace(terms, downlink_byte_ns=0)  # in its time a welcome is there at once
     if lead != "auto":
         return terms
     shortest = terms.with_shortest_lead(clock)

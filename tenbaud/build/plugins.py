@@ -67,10 +67,11 @@ def build_class(
     except Exception as error:  # it is the user's code, and anything may be wrong in it
         if ours and isinstance(error, ValueError):
             raise PartError(f"{where}: {error}") from error
+        call = ", ".join(["context", *(f"{name}={value!r}" for name, value in options.items())])
+        names = ", ".join(getattr(type(context), "__dataclass_fields__", ()))
         raise PartError(
-            f"{where}: {found.__name__}({_call(options)}) failed: "
-            f"{type(error).__name__}: {error}. It is called with one context object "
-            f"({type(context).__name__}: {', '.join(_names(context))}) and its options."
+            f"{where}: {found.__name__}({call}) failed: {type(error).__name__}: {error}. "
+            f"It is called with one context object ({type(context).__name__}: {names}) and its options."
         ) from error
     check_part(where, part, protocol)
     return part
@@ -113,11 +114,3 @@ def _offered(registry: Registry, name: str) -> Any:
         return registry.load(name)
     except RegistryError as error:
         raise PartError(str(error)) from error
-
-
-def _call(options: Mapping[str, Any]) -> str:
-    return ", ".join(["context", *(f"{name}={value!r}" for name, value in options.items())])
-
-
-def _names(context: object) -> list[str]:
-    return list(getattr(type(context), "__dataclass_fields__", {}))

@@ -123,7 +123,8 @@ class _Adoption:
         # From here on in its own ticks.
         log = read_flight_log(self._config)
         asked_s, length_s = self._config.duration_s, len(log) * self._config.timing.tick_s
-        self._take(self._duration(length_s))
+        if not self._is_given("duration_s") or asked_s > length_s:
+            self._take({"duration_s": float(f"{length_s:.{DIGITS}g}")})
         self._take(self._commands(log))
         self._take(self._start(log))
         self._take({"flight_log.digest": digest_of(log, configured_signals(self._config))})
@@ -160,12 +161,6 @@ class _Adoption:
                 for name, matrix in zip("FE", matrices, strict=True)
             }
         self._take(settings)
-
-    def _duration(self, length_s: float) -> dict[str, Any]:
-        """Return the duration: that of the recording, or of less of it."""
-        if self._is_given("duration_s") and self._config.duration_s <= length_s:
-            return {}
-        return {"duration_s": float(f"{length_s:.{DIGITS}g}")}
 
     def _commands(self, log: FlightLog) -> dict[str, Any]:
         """Return limits and steps with which every command of the recording passes as it is."""

@@ -24,7 +24,7 @@ from receiver.controllers.references import (
 from receiver.session.commander import UNWRITTEN_MAX
 from tenbaud.build.signals import per_output
 from tenbaud.config.controllers import ReferenceSection
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.encoders import check_outputs
 
@@ -55,7 +55,7 @@ def build_references(config: FlightConfig, signals: Signals, model: Model | None
     """
     tick_s = config.timing.tick_s
     found: list[Reference | None] = []
-    stops: dict[str, tuple[float, float]] = getattr(config.model, "stops", {})
+    stops = config.model.stops
     for output, section in reference_sections(config, signals):
         found.append(None if section is None else reference_of(section, tick_s, output))
         if section is not None and output.name in stops:
@@ -88,12 +88,10 @@ def set_point_limits(
     section, tick_s = config.limits, config.timing.tick_s
     largest = per_output("limits.set_point_max", section.set_point_max, signals)
     slew = per_output("limits.set_point_slew_per_s", section.set_point_slew_per_s, signals)
-    free = (math.inf,) * len(signals.outputs)
-    if not largest and not slew:
-        return (None,) * len(free)
-    start = (0.0,) * len(free) if model is None else model.measured(model.initial())
-    steps = [one * tick_s for one in slew or free]
-    return tuple(zip(start, largest or free, steps, strict=True))
+    if {*largest, *slew} == {math.inf}:
+        return (None,) * len(largest)
+    start = (0.0,) * len(largest) if model is None else model.measured(model.initial())
+    return tuple(zip(start, largest, [one * tick_s for one in slew], strict=True))
 
 
 def limits_kept(
@@ -160,18 +158,14 @@ def _about_zero(section: ReferenceSection, tick_s: float, output: Signal) -> Ref
         case "points":
             if not section.points:
                 raise ConfigError(f"receiver.reference: the points of {output.name} are missing")
-            try:
+            with config_errors(f"receiver.reference: points of {output.name}"):
                 times_s, values = zip(*section.points, strict=True)
                 return Listed(times_s, values, tick_s)
-            except ValueError as error:
-                raise ConfigError(f"receiver.reference: points of {output.name}: {error}") from error
         case "csv":
             if not section.file:
                 raise ConfigError("receiver.reference.file names no file for the csv reference")
-            try:
+            with config_errors("receiver.reference"):
                 return Csv(section.file, tick_s, output.column)
-            except ValueError as error:
-                raise ConfigError(f"receiver.reference: {error}") from error
         case "none":
             raise ConfigError(f"the output {output.name} follows no reference")
 

@@ -20,7 +20,7 @@ from tenbaud.build.signals import (
     safe_command,
 )
 from tenbaud.config.kinds import PLANTS
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig, TransmitterSection
@@ -47,8 +47,13 @@ def build_rig(config: FlightConfig, plant: Plant | None = None, signals: Signals
     signals = signals or configured_signals(config)
     if section.rig in REAL_RIGS:
         rig: Rig = build_device(config, not section.dry_run, signals)
+    elif section.rig == "replay":
+        rig = ReplayRig(read_flight_log(config, signals))
     else:
-        rig = _build_other(config, plant, signals)
+        plant = plant or build_plant(config, config.timing.tick_s, signals)
+        names = [one.name for one in signals.outputs]
+        encoders = build_encoders(config, signals)
+        rig = SimulatedRig(plant, encoders, safe_command(config, signals), names)
     return DryRig(rig, len(signals.inputs)) if section.dry_run else rig
 
 
@@ -62,20 +67,14 @@ def build_device(config: FlightConfig, output: bool, signals: Signals | None = N
         rate_max_rad_per_s=section.bridge.rate_max_rad_per_s,
         output=output,
     )
-    try:
-        match section.rig:
-            case "serial":
-                return _build_serial(config, settings, signals)
-            case "quarc":
-                return _build_quarc(config, settings, signals)
-            case "hil":
-                return _build_hil(config, settings, signals)
-    except ValueError as error:
-        raise ConfigError(f"transmitter.{section.rig}: {error}") from error
-    raise ConfigError(
-        f"rig = {section.rig!r} is not a device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
-        "quarc:HOST:PORT, quarc-server:PORT or hil"
-    )
+    build = {"serial": _build_serial, "quarc": _build_quarc, "hil": _build_hil}.get(section.rig)
+    if build is None:
+        raise ConfigError(
+            f"rig = {section.rig!r} is not a device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
+            "quarc:HOST:PORT, quarc-server:PORT or hil"
+        )
+    with config_errors(f"transmitter.{section.rig}"):
+        return build(config, settings, signals)
 
 
 def real_rig_name(section: TransmitterSection) -> str:
@@ -112,10 +111,8 @@ def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> Plan
     section = config.transmitter.plant
     disturbance = None
     if section.disturbance:
-        try:
+        with config_errors("transmitter.plant.disturbance"):
             disturbance = parse_disturbance(section.disturbance, step_s, config.seed)
-        except ValueError as error:
-            raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
     context = PlantContext(
         step_s,
         config.seed,
@@ -139,10 +136,8 @@ def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> Plan
 
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
     """Return the pitch axis."""
-    try:
+    with config_errors("transmitter.plant.disturbance"):
         (disturbance,) = context.disturbances(1) or (None,)
-    except ValueError as error:
-        raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
     return PitchPlant(
         nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,
@@ -161,15 +156,6 @@ def nominal_plant(config: FlightConfig, volts_max: float | None = None) -> Pitch
     follows = isinstance(model, PitchModelSection) and plant.relative_to == "model"
     section = model if follows else plant.pitch
     return PitchParameters(**section.model_dump(exclude={"kind", "start"}), volts_max=volts_max)
-
-
-def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) -> Rig:
-    if config.transmitter.rig == "replay":
-        return ReplayRig(read_flight_log(config, signals))
-    if plant is None:
-        plant = build_plant(config, config.timing.tick_s, signals)
-    names = [one.name for one in signals.outputs]
-    return SimulatedRig(plant, build_encoders(config, signals), safe_command(config, signals), names)
 
 
 def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Axis, ...]:

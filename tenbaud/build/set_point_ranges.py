@@ -15,10 +15,10 @@ from tenbaud.build.references import (
     reference_sections,
     set_point_limits,
 )
-from tenbaud.config.downlink import PerSteered
+from tenbaud.build.signals import per_output
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
-from tenbaud.design.encoders import check_outputs, output_names
+from tenbaud.design.encoders import output_names
 
 
 def set_point_ranges(
@@ -30,8 +30,8 @@ def set_point_ranges(
     what is beyond them, chosen so that the least and the largest are words without rounding.
     """
     section, outputs = config.downlink, signals.outputs
-    lowest = _by_output("downlink.set_point_min", section.set_point_min, signals)
-    highest = _by_output("downlink.set_point_max", section.set_point_max, signals)
+    lowest = per_output("downlink.set_point_min", section.set_point_min, signals, -math.inf)
+    highest = per_output("downlink.set_point_max", section.set_point_max, signals)
     found = []
     if given is None:
         steered = _programmes(config, signals, codec.model)
@@ -43,11 +43,9 @@ def set_point_ranges(
             continue
         least, most, start = one
         low, high = lowest[place], highest[place]
-        low = output.low if low is None else low
-        high = output.high if high is None else high
-        usual_low, usual_high = _around(least, most, section.bits)
-        low = usual_low if low == -math.inf else low
-        high = usual_high if high == math.inf else high
+        around = _around(least, most, section.bits)
+        low = next((one for one in (low, output.low) if one > -math.inf), around[0])
+        high = next((one for one in (high, output.high) if one < math.inf), around[1])
         _require_range(output, low, high, least, most)
         found.append(SetPointRange(place, low, high, start))
     if not found:
@@ -80,22 +78,6 @@ def _require_range(output: Signal, low: float, high: float, least: float, most: 
             f"the set-points of {output.name} reach from {least:g} to {most:g} {output.unit}, beyond "
             f"the range of their words, {low:g} to {high:g}: {advice}"
         )
-
-
-def _by_output(field: str, given: PerSteered, signals: Signals) -> list[float | None]:
-    """Return a value for each output, None for one that is not given."""
-    outputs = signals.outputs
-    if isinstance(given, dict):
-        check_outputs(field, given, signals)
-        return [given.get(one.name) for one in outputs]
-    if not isinstance(given, tuple):
-        return [given] * len(outputs)
-    if len(given) != len(outputs):
-        raise ConfigError(
-            f"{field} has {len(given)} values, and the plant {len(outputs)} output(s): "
-            f"{output_names(signals)}"
-        )
-    return list(given)
 
 
 def _programmes(

@@ -10,7 +10,7 @@ from channel.protocol.limits import CommandLimits, per_input, require_carried
 from plant_sim.encoder import OutputReader
 from tenbaud.build.codec import build_model
 from tenbaud.build.parts import Parts
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig, PerOutput
 from tenbaud.design.encoders import check_outputs, encoders_of, output_names, steps_of
 
@@ -24,10 +24,8 @@ def build_limits(config: FlightConfig, signals: Signals) -> CommandLimits:
     """Return clamp and slew of each input, the latter per tick."""
     section, tick_s = config.limits, config.timing.tick_s
     slews = per_input("limits.command_slew_per_s", section.command_slew_per_s, signals)
-    try:
+    with config_errors("limits"):
         return CommandLimits.of(signals, section.command_max, [slew * tick_s for slew in slews])
-    except ValueError as error:
-        raise ConfigError(f"limits: {error}") from error
 
 
 def initial_command(config: FlightConfig, signals: Signals) -> Vector:
@@ -41,29 +39,23 @@ def safe_command(config: FlightConfig, signals: Signals) -> Vector:
 
 
 def _command(field: str, given: float | tuple[float, ...], signals: Signals) -> Vector:
-    try:
+    with config_errors():
         command = per_input(field, given, signals)
         require_carried(field, command, signals)
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
     return command
 
 
 def soft_limits(config: FlightConfig, signals: Signals) -> Vector:
-    """Return the largest value of each output before the guard steps in; () without any."""
+    """Return the largest value of each output before the guard steps in."""
     return per_output("transmitter.soft_limits", config.transmitter.soft_limits, signals)
 
 
-def per_output(field: str, given: PerOutput, signals: Signals) -> Vector:
-    """Return one value for each output, infinity for one that a table leaves out.
-
-    () where none is given; ConfigError where they do not fit the outputs.
-    """
-    if given is None:
-        return ()
+def per_output(field: str, given: PerOutput, signals: Signals, without: float = math.inf) -> Vector:
+    """Return one value for each output, `without` for one that has none; ConfigError for misfits."""
+    given = without if given is None else given
     if isinstance(given, dict):
         check_outputs(field, given, signals)
-        return tuple([given.get(one.name, math.inf) for one in signals.outputs])
+        return tuple([given.get(one.name, without) for one in signals.outputs])
     limits = (given,) * len(signals.outputs) if isinstance(given, float) else given
     if len(limits) != len(signals.outputs):
         raise ConfigError(

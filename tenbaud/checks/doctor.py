@@ -51,13 +51,13 @@ def examine(config: FlightConfig, connect: tuple[str, ...] = ()) -> list[Finding
     agreement = agree(config, "real")
     return [
         *_software(),
-        *_numerics(agreement),
+        _numerics(agreement),
         *narrow_downlink(agreement),
         *_clock(config),
         *_ports(),
         serial_line(config),
-        *_vendor(),
-        *_zenoh(),
+        _vendor(),
+        _zenoh(),
         *(_reach(endpoint) for endpoint in connect),
     ]
 
@@ -87,15 +87,10 @@ def _software() -> list[Finding]:
     ]
 
 
-def _numerics(agreement: Agreement) -> list[Finding]:
-    return [
-        Finding(
-            "ok",
-            "numerics probe",
-            f"{agreement.identity.numerics_probe.hex()} with preset {agreement.config.preset}; the "
-            "other machine must show the same",
-        )
-    ]
+def _numerics(agreement: Agreement) -> Finding:
+    probe = agreement.identity.numerics_probe.hex()
+    text = f"{probe} with preset {agreement.config.preset}; the other machine must show the same"
+    return Finding("ok", "numerics probe", text)
 
 
 def narrow_downlink(agreement: Agreement) -> list[Finding]:
@@ -186,16 +181,16 @@ def line_rates(config: FlightConfig) -> dict[Rung, int]:
     }
 
 
-def _vendor() -> list[Finding]:
+def _vendor() -> Finding:
     try:
         found = importlib.util.find_spec("quanser.hardware") is not None
     except ModuleNotFoundError:
         found = False
     text = "quanser.hardware is there" if found else "no quanser.hardware; needed for --rig hil only"
-    return [Finding("ok" if found else "note", "Quanser", text)]
+    return Finding("ok" if found else "note", "Quanser", text)
 
 
-def _zenoh() -> list[Finding]:
+def _zenoh() -> Finding:
     """Let two sessions on this machine meet and count how long messages take."""
     from channel.links.zenoh.link import ZenohLink
 
@@ -208,27 +203,22 @@ def _zenoh() -> list[Finding]:
             ZenohLink("transmitter", "doctor", connect=(endpoint,)) as transmitter,
         ):
             if not _present(transmitter, TRIP_TIMEOUT_S):
-                return [Finding("problem", "Zenoh", f"two sessions at {endpoint} did not meet")]
+                return Finding("problem", "Zenoh", f"two sessions at {endpoint} did not meet")
             for _ in range(ROUND_TRIPS):
                 begun = time.perf_counter()
                 transmitter.send(there)
                 if receiver.receive(TRIP_TIMEOUT_S) is None:
-                    return [Finding("problem", "Zenoh", f"a message at {endpoint} did not arrive")]
+                    return Finding("problem", "Zenoh", f"a message at {endpoint} did not arrive")
                 receiver.send(b"back")
                 if transmitter.receive(TRIP_TIMEOUT_S) is None:
-                    return [Finding("problem", "Zenoh", f"an answer at {endpoint} did not arrive")]
+                    return Finding("problem", "Zenoh", f"an answer at {endpoint} did not arrive")
                 trips_ms.append((time.perf_counter() - begun) * 1e3)
     except LinkError as error:
-        return [Finding("problem", "Zenoh", str(error))]
+        return Finding("problem", "Zenoh", str(error))
     trips_ms.sort()
-    return [
-        Finding(
-            "ok",
-            "Zenoh",
-            f"loopback round trip {trips_ms[ROUND_TRIPS // 2]:.2f} ms (half), "
-            f"{trips_ms[-1]:.2f} ms (worst of {ROUND_TRIPS})",
-        )
-    ]
+    half_ms, worst_ms = trips_ms[ROUND_TRIPS // 2], trips_ms[-1]
+    text = f"loopback round trip {half_ms:.2f} ms (half), {worst_ms:.2f} ms (worst of {ROUND_TRIPS})"
+    return Finding("ok", "Zenoh", text)
 
 
 def _reach(endpoint: str) -> Finding:

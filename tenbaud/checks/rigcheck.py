@@ -14,8 +14,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from tenbaud.build.first_contact import proposed
 from tenbaud.build.rig import build_device, real_rig_name
-from tenbaud.checks.proposal import proposed
 from tenbaud.config.load import nested, toml_text
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis

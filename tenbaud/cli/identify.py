@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,73 +18,41 @@ if TYPE_CHECKING:
 
 PRINTED_EVERY_S = 10.0
 
-Bandwidth = Annotated[
-    float | None,
-    typer.Option(
-        help="Pass band w_f of the filters, rad/s; near the frequency of the motion if not given.",
-        min=1e-6,
-        max=1000.0,
-        show_default=False,
-    ),
-]
-Damping = Annotated[float, typer.Option(help="Damping rho of the filters.", min=0.01, max=100.0)]
-Forgetting = Annotated[
-    float | None,
-    typer.Option(
-        help="alpha of (10), 1/s; 0.01 for an experiment, 0 for a record, if not given.",
-        min=0.0,
-        max=100.0,
-        show_default=False,
-    ),
-]
-Structure = Annotated[
-    str,
-    typer.Option(
-        help="pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear; chosen by "
-        "model and signals if not given.",
-        show_default=False,
-    ),
-]
-Lag = Annotated[
-    str,
-    typer.Option(help="Motor lag: auto (model.motor_lag_s if set, else estimated), or s."),
-]
+
+@dataclass(frozen=True, slots=True)
+class MethodOptions:
+    """From what a plant is identified, and how."""
+
+    source: Annotated[Path | None, typer.Argument()] = None
+    """A log or the folder of a run; not given: excite the simulated rig."""
+    structure: str = ""
+    """pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear; chosen by model and signals
+    if not given."""
+    lag: str = "auto"
+    """Motor lag: auto (model.motor_lag_s if set, else estimated), or s."""
+    duration: options.Duration = None
+    excitation: list[str] | None = None
+    """square:HZ,BIAS,MAGNITUDE, prbs:BIT_S,BIAS,MAGNITUDE or chirp:START,END,DURATION,MAGNITUDE in Hz,
+    s, V; repeatable. Not given: two square waves."""
+    equilibrium: str = "auto"
+    """theta_0: auto, quiet (an interval at rest), estimate, or rad."""
+    bandwidth: Annotated[float | None, typer.Option(min=1e-6, max=1000.0)] = None
+    """Pass band w_f of the filters, rad/s; near the frequency of the motion if not given."""
+    damping: Annotated[float, typer.Option(min=0.01, max=100.0)] = 0.7
+    """Damping rho of the filters."""
+    forgetting: Annotated[float | None, typer.Option(min=0.0, max=100.0)] = None
+    """alpha of (10), 1/s; 0.01 for an experiment, 0 for a record, if not given."""
+    from_bits: bool = False
+    """Use only the transmitted data of a run: symbols and commands."""
+    fly: Annotated[bool, typer.Option("--fly/--no-fly")] = True
+    """Fly the record with the identified model."""
 
 
 @spread
 def identify(
     plant: options.PlantOptions,
     log: LogOptions,
-    source: Annotated[
-        Path | None,
-        typer.Argument(help="A log or the folder of a run; not given: excite the simulated rig."),
-    ] = None,
-    structure: Structure = "",
-    lag: Lag = "auto",
-    duration: options.Duration = None,
-    excitation: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="square:HZ,BIAS,MAGNITUDE, prbs:BIT_S,BIAS,MAGNITUDE or "
-            "chirp:START,END,DURATION,MAGNITUDE in Hz, s, V; repeatable. Not given: two square waves."
-        ),
-    ] = None,
-    equilibrium: Annotated[
-        str, typer.Option(help="theta_0: auto, quiet (an interval at rest), estimate, or rad.")
-    ] = "auto",
-    bandwidth: Bandwidth = None,
-    damping: Damping = 0.7,
-    forgetting: Forgetting = None,
-    from_bits: Annotated[
-        bool,
-        typer.Option(
-            "--from-bits",
-            help="Use only the transmitted data of a run: symbols and commands.",
-        ),
-    ] = False,
-    fly: Annotated[
-        bool, typer.Option("--fly/--no-fly", help="Fly the record with the identified model.")
-    ] = True,
+    method: MethodOptions,
     out: options.Out = None,
     json: options.AsJson = False,
 ) -> None:
@@ -104,19 +73,20 @@ def identify(
     given = given_names(plant.config, options.overrides(**options.fields_of(plant), log=log))
     given |= {"preset"} if plant.preset else set()
     request = Request(
-        structure,
-        lag,
-        equilibrium,
-        bandwidth,
-        damping,
-        forgetting,
-        fly=fly,
+        method.structure,
+        method.lag,
+        method.equilibrium,
+        method.bandwidth,
+        method.damping,
+        method.forgetting,
+        fly=method.fly,
         given=frozenset(given),
-        from_bits=from_bits,
+        from_bits=method.from_bits,
     )
+    duration = method.duration
     if duration is not None and duration / loaded.timing.tick_s > 10_000_000:
         raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks")
-    sources = sources_of(loaded, source, request, excitation, duration)
+    sources = sources_of(loaded, method.source, request, method.excitation, duration)
     result = identify_sources(loaded, sources, request)
     _write(result, out, request, json)
     if not result.supported:

@@ -8,48 +8,30 @@ from typing import Annotated, Any
 
 import typer
 
-CLOCK: Any = {"min": -2.4e9, "max": 2.4e9, "show_default": False}
-
-
-def _text(help: str, *names: str) -> Any:
-    return typer.Option(*names, help=help, show_default=False)
-
 
 @dataclass(frozen=True, slots=True)
 class LogOptions:
     """Columns, units and the interval of a log."""
 
-    columns: Annotated[
-        str,
-        _text(
-            "Columns of the log, by name or number: angle=NAME,front=NAME,time=NAME. Names are the "
-            "model's signals, angle (its first output), input, time and index; 0: no such input."
-        ),
-    ] = ""
-    units: Annotated[
-        str,
-        _text("Units in the log: pitch=deg,time=ms; one word: of all angles.", "--units", "--unit"),
-    ] = ""
-    sign: Annotated[str, _text("Signs of columns: pitch=-1.")] = ""
-    scale: Annotated[str, _text("Factors of columns: front=0.01.")] = ""
-    offset: Annotated[str, _text("Offsets added to columns then: pitch=-0.2.")] = ""
-    start: Annotated[
-        float | None,
-        typer.Option("--from", help="Start within the log, on its own clock, s.", **CLOCK),
-    ] = None
-    end: Annotated[
-        float | None, typer.Option("--to", help="End within the log, on its own clock, s.", **CLOCK)
-    ] = None
-    period: Annotated[
-        float | None,
-        typer.Option(help="Time between rows of a log without a clock, s.", min=1e-6, max=1e6),
-    ] = None
-    remove_spikes: Annotated[
-        bool,
-        typer.Option(
-            "--remove-spikes", help="Replace single outlier rows by the mean of their neighbours."
-        ),
-    ] = False
+    columns: str = ""
+    """Columns of the log, by name or number: angle=NAME,front=NAME,time=NAME. Names are the model's
+    signals, angle (its first output), input, time and index; 0: no such input."""
+    units: Annotated[str, typer.Option("--units", "--unit")] = ""
+    """Units in the log: pitch=deg,time=ms; one word: of all angles."""
+    sign: str = ""
+    """Signs of columns: pitch=-1."""
+    scale: str = ""
+    """Factors of columns: front=0.01."""
+    offset: str = ""
+    """Offsets added to columns then: pitch=-0.2."""
+    start: Annotated[float | None, typer.Option("--from", min=-2.4e9, max=2.4e9)] = None
+    """Start within the log, on its own clock, s."""
+    end: Annotated[float | None, typer.Option("--to", min=-2.4e9, max=2.4e9)] = None
+    """End within the log, on its own clock, s."""
+    period: Annotated[float | None, typer.Option(min=1e-6, max=1e6)] = None
+    """Time between rows of a log without a clock, s."""
+    remove_spikes: bool = False
+    """Replace single outlier rows by the mean of their neighbours."""
 
     def settings(self) -> dict[str, Any]:
         """Return the fields of the configuration that the options set, by their full names."""

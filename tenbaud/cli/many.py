@@ -6,7 +6,7 @@ import gc
 import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from tenbaud.cli import options
 
 if TYPE_CHECKING:
     from channel.protocol.terms import Clock
+    from receiver.loops.many import ManyService
     from tenbaud.build.flight import Agreement
     from tenbaud.flight.many import ManyHost
     from tenbaud.sentences.flown import Summary
@@ -43,7 +44,7 @@ def serve(
     from tenbaud.recording.folder import create_run_folder
 
     sessions, most = many.sessions or "", math.inf if many.flights is None else many.flights
-    agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
+    agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock)
     common = agreement_of("")
     if not common.link.serves_many:
         raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")
@@ -78,8 +79,7 @@ def serve(
         finally:
             lines[1:] = []
             host.close()
-    summary = _summary(host, service.lateness.percentile_ms, sessions)
-    summary["turned_away"] = dict(refused + hub.counts.refused)
+    summary = _summary(host, service, sessions, refused + hub.counts.refused)
     write_whole(root / "summary.json", json.dumps(summary, indent=2) + "\n")
     if node.json:
         options.print_json(summary)
@@ -123,14 +123,17 @@ def agreements(
     return agreement_of
 
 
-def _summary(host: ManyHost, late_ms: Callable[[float], float | None], sessions: str) -> Summary:
+def _summary(
+    host: ManyHost, service: ManyService, sessions: str, turned_away: Mapping[str, int]
+) -> Summary:
     return {
         "sessions": sessions,
         "flights": host.summaries,
         "refused": host.counts["refused"],
         "strays": host.counts["strays"],
-        "loop_late_ms_p50": late_ms(50.0),
-        "loop_late_ms_p99": late_ms(99.0),
+        "loop_late_ms_p50": service.lateness.percentile_ms(50.0),
+        "loop_late_ms_p99": service.lateness.percentile_ms(99.0),
+        "turned_away": dict(turned_away),
     }
 
 

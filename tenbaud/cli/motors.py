@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -17,16 +17,10 @@ if TYPE_CHECKING:
 class MotorOptions:
     """Before the motors of a real rig turn."""
 
-    accept_risk: Annotated[
-        bool,
-        typer.Option(
-            "--accept-risk",
-            help="Real rig: fly without the soft, input and set-point limits of a first flight.",
-        ),
-    ] = False
-    yes: Annotated[bool, typer.Option("--yes", help="Real rig: do not ask before its motors turn.")] = (
-        False
-    )
+    accept_risk: bool = False
+    """Real rig: fly without the soft, input and set-point limits of a first flight."""
+    yes: bool = False
+    """Real rig: do not ask before its motors turn."""
 
 
 def confirm_motors(config: FlightConfig, yes: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,21 +19,28 @@ if TYPE_CHECKING:
     from tenbaud.recording.folder import RunFolder
 
 
+@dataclass(frozen=True, slots=True)
+class SensorOptions:
+    """The options of the transmitter alone."""
+
+    duration: options.Duration = None
+    seed: options.Seed = None
+    rig: options.Rig = None
+    dry_run: options.DryRun = False
+    mismatch: options.Mismatch = None
+    disturbance: options.Disturbance = None
+    on_desync: options.OnDesync = None
+    pace: options.Pace = None
+    figure: options.Draw = True
+
+
 @spread
 def transmit(
     node: options.NodeOptions,
     addresses: options.Addresses,
     log: LogOptions,
     risk: MotorOptions,
-    duration: options.Duration = None,
-    seed: options.Seed = None,
-    rig: options.Rig = None,
-    dry_run: options.DryRun = False,
-    mismatch: options.Mismatch = None,
-    disturbance: options.Disturbance = None,
-    on_desync: options.OnDesync = None,
-    pace: options.Pace = None,
-    figure: options.Draw = True,
+    sensor: SensorOptions,
 ) -> None:
     """Run the sensor node: the rig, and one bit per sample to the receiver.
 
@@ -44,19 +52,10 @@ def transmit(
 
     [dim]tenbaud transmit --link serial --port /dev/ttyUSB0[/dim]
     """
-    changed = node.changes(
-        duration=duration,
-        seed=seed,
-        rig=rig,
-        log=log,
-        dry_run=dry_run,
-        mismatch=mismatch,
-        disturbance=disturbance,
-        on_desync=on_desync,
-    )
-    if pace is not None and node.clock is not options.ClockOption.VIRTUAL:
+    changed = options.overrides(**options.fields_of(node, sensor), log=log)
+    if sensor.pace is not None and node.clock != "virtual":
         raise typer.BadParameter("--pace slows the virtual clock down; the real one cannot be paced")
-    _run("transmitter", node, addresses, changed, pace=pace, figure=figure, risk=risk)
+    _run("transmitter", node, addresses, changed, pace=sensor.pace, figure=sensor.figure, risk=risk)
 
 
 @spread
@@ -83,7 +82,8 @@ def receive(
 
     [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
-    changed = node.changes(rig=rig, log=log, sabotaged_end="receiver")
+    own = options.fields_of(node)
+    changed = options.overrides(**own, rig=rig, log=log, sabotaged_end="receiver")
     if rigs.sessions is None:
         if rigs.configs is not None or rigs.flights is not None:
             raise typer.BadParameter("--configs and --flights go with --sessions, the names to serve")
@@ -114,10 +114,11 @@ def _run(
     figure: bool = False,
     risk: MotorOptions | None = None,
 ) -> None:
+    """Run one end; `risk` is that of the transmitter, which has the rig and the flight's length."""
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from tenbaud.build.ends import check_parts, check_rig, check_sabotage
+    from tenbaud.build.ends import check_flight, check_parts
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
@@ -132,12 +133,11 @@ def _run(
     config = flight_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
     telemetry = TelemetryOptions(node.telemetry, node.allow_control, pace)
-    agreement = replace(agree(config, node.clock.value), live=telemetry.control)
+    agreement = replace(agree(config, node.clock), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
-    check_parts(config)
-    if role == "transmitter":  # it alone knows how long the flight is
-        check_sabotage(agreement)
-    if risk is not None and check_rig(config, risk.accept_risk):
+    if risk is None:
+        check_parts(config)
+    elif check_flight(agreement, risk.accept_risk):
         confirm_motors(config, risk.yes)
     telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None

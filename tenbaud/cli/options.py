@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -14,13 +13,6 @@ from tenbaud.cli.log_options import LogOptions as LogOptions
 
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
-
-
-class ClockOption(StrEnum):
-    """The clock of a flight."""
-
-    REAL = "real"
-    VIRTUAL = "virtual"
 
 
 Preset = Annotated[
@@ -48,17 +40,9 @@ Seed = Annotated[
     int | None,
     typer.Option(help="Seed of all random numbers.", min=0, max=2**63 - 1),
 ]
-Lead = Annotated[
-    int | None,
-    typer.Option(help="Command lead D in ticks; chosen from the delivery times if not given."),
+Clock = Annotated[
+    Literal["real", "virtual"], typer.Option(help="virtual: as fast as possible; real: in real time.")
 ]
-Delivery = Annotated[
-    str | None,
-    typer.Option(
-        help="start: a bit arrives at once (the paper); end: at the end of its slot (a wire)."
-    ),
-]
-Clock = Annotated[ClockOption, typer.Option(help="virtual: as fast as possible; real: in real time.")]
 Out = Annotated[
     Path | None, typer.Option(help="New folder for the run; runs/<time>_<name> if not given.")
 ]
@@ -79,22 +63,9 @@ Settings = Annotated[
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
-Mismatches = Annotated[
-    list[float] | None,
-    typer.Option(
-        "--mismatch",
-        help="Model mismatch of the simulated plant, 10% or 0.1; repeatable, one flight each. Not "
-        "given: as configured; 10% if none of --preset, --config, --rig or a plant setting is given.",
-    ),
-]
 Mismatch = Annotated[
     float | None,
     typer.Option(help="Model mismatch of the simulated plant, 10% or 0.1."),
-]
-LineRate = Annotated[int | None, typer.Option(help="Bits per second on the serial line (115200).")]
-Downlink = Annotated[
-    str | None,
-    typer.Option(help="Separate link for the commands: zenoh, or a second serial port."),
 ]
 Rig = Annotated[str | None, typer.Option(help=rigs.FORMS)]
 Disturbance = Annotated[
@@ -105,12 +76,6 @@ Impair = Annotated[
     typer.Option(
         help='Impairments of the line, such as "up:loss=0.3,delay=30ms". On a real clock they '
         "apply to outgoing messages; pass the same value to both ends."
-    ),
-]
-Sabotage = Annotated[
-    str | None,
-    typer.Option(
-        help="Corrupt one bit of this end's codec on purpose, such as sample=500,field=range."
     ),
 ]
 OnDesync = Annotated[
@@ -138,17 +103,6 @@ Pace = Annotated[
     float | None,
     typer.Option(min=0.05, max=1e6, help="Virtual clock: maximum speed as a multiple of real time."),
 ]
-View = Annotated[
-    bool,
-    typer.Option(
-        "--view",
-        help="Serve a live page to watch, control and disturb the flight. It flies in "
-        "real time (--pace for other speeds) for an hour, or --duration, or until Ctrl-C.",
-    ),
-]
-ViewPort = Annotated[
-    int, typer.Option(min=0, max=65535, help="Port of the live page; 0: any free one.")
-]
 OpenBrowser = Annotated[
     bool, typer.Option("--open", help="Open the live page in the browser of this machine.")
 ]
@@ -163,28 +117,17 @@ class Addresses:
 
     listen: Listen = None
     connect: Connect = None
-    router: Annotated[
-        list[str] | None,
-        typer.Option(help="Zenoh router between the ends, instead of --listen and --connect."),
-    ] = None
-    scout: Annotated[
-        bool, typer.Option("--scout", help="Find the other end by multicast in this network.")
-    ] = False
-    keys: Annotated[
-        Path | None,
-        typer.Option(help="This node's key folder (`tenbaud keys`): TLS, and only named peers."),
-    ] = None
-    peer: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="With --keys: certificate name accepted at the other end; behind a router the "
-            "router's name. Repeatable. With --sessions, NAME=SESSION restricts it to one session."
-        ),
-    ] = None
-    viewer: Annotated[
-        list[str] | None,
-        typer.Option(help="With --keys: certificate name that may watch but not send. Repeatable."),
-    ] = None
+    router: list[str] | None = None
+    """Zenoh router between the ends, instead of --listen and --connect."""
+    scout: bool = False
+    """Find the other end by multicast in this network."""
+    keys: Path | None = None
+    """This node's key folder (`tenbaud keys`): TLS, and only named peers."""
+    peer: list[str] | None = None
+    """With --keys: certificate name accepted at the other end; behind a router the router's name.
+    Repeatable. With --sessions, NAME=SESSION restricts it to one session."""
+    viewer: list[str] | None = None
+    """With --keys: certificate name that may watch but not send. Repeatable."""
     insecure: Insecure = False
 
 
@@ -192,28 +135,14 @@ class Addresses:
 class ManyOptions:
     """`--sessions` of `receive`, and its options."""
 
-    sessions: Annotated[
-        str | None,
-        typer.Option(
-            help="Serve every session whose name matches, such as 'rig/*', in this one process."
-        ),
-    ] = None
-    configs: Annotated[
-        Path | None,
-        typer.Option(
-            help="With --sessions: folder of files for single sessions, rig/7.toml for rig/7."
-        ),
-    ] = None
-    rigs_max: Annotated[
-        int,
-        typer.Option(
-            help="With --sessions: maximum number of simultaneous flights.", min=1, max=100_000
-        ),
-    ] = 100
-    flights: Annotated[
-        int | None,
-        typer.Option(help="With --sessions: end after this number of flights.", min=1, max=10**9),
-    ] = None
+    sessions: str | None = None
+    """Serve every session whose name matches, such as 'rig/*', in this one process."""
+    configs: Path | None = None
+    """With --sessions: folder of files for single sessions, rig/7.toml for rig/7."""
+    rigs_max: Annotated[int, typer.Option(min=1, max=100_000)] = 100
+    """With --sessions: maximum number of simultaneous flights."""
+    flights: Annotated[int | None, typer.Option(min=1, max=10**9)] = None
+    """With --sessions: end after this number of flights."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,12 +171,18 @@ class _Configured:
 
     preset: Preset = None
     config: ConfigFile = None
-    lead: Lead = None
-    delivery: Delivery = None
-    line_rate: LineRate = None
-    downlink: Downlink = None
+    lead: int | None = None
+    """Command lead D in ticks; chosen from the delivery times if not given."""
+    delivery: str | None = None
+    """start: a bit arrives at once (the paper); end: at the end of its slot (a wire)."""
+    line_rate: int | None = None
+    """Bits per second on the serial line (115200)."""
+    downlink: str | None = None
+    """With --link serial: separate link for the commands, zenoh or a second port. For what comes
+    down: --set channel.downlink=... (narrow, compact, full)."""
     impair: Impair = None
-    sabotage: Sabotage = None
+    sabotage: str | None = None
+    """Corrupt one bit of this end's codec on purpose, such as sample=500,field=range."""
     settings: Settings = None
 
 
@@ -255,16 +190,12 @@ class _Configured:
 class FlightOptions(_Configured):
     """The flight of `demo`."""
 
-    clock: Clock = ClockOption.VIRTUAL
+    clock: Clock = "virtual"
     duration: Duration = None
     seed: Seed = None
-    link: Annotated[
-        str | None,
-        typer.Option(
-            help="zenoh: two processes; serial: two processes and an emulated line between them; "
-            "memory: both ends in this process."
-        ),
-    ] = None
+    link: str | None = None
+    """zenoh: two processes; serial: two processes and an emulated line between them; memory: both ends
+    in this process."""
     rig: Rig = None
     dry_run: DryRun = False
     disturbance: Disturbance = None
@@ -275,43 +206,25 @@ class FlightOptions(_Configured):
 class NodeOptions(_Configured):
     """Common options of `transmit` and `receive`, except addresses."""
 
-    session: Annotated[str | None, typer.Option(help="Session name; the same at both ends.")] = None
-    link: Annotated[
-        str | None,
-        typer.Option(help="zenoh, serial with --port, or a kind from an installed package."),
-    ] = None
-    port: Annotated[
-        str | None,
-        typer.Option(
-            help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT."
-        ),
-    ] = None
-    clock: Clock = ClockOption.REAL
-    telemetry: Annotated[
-        str,
-        typer.Option(
-            help="For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket "
-            "that only this user can open; off beside an insecure link that leaves this machine."
-        ),
-    ] = ""
-    allow_control: Annotated[
-        bool,
-        typer.Option(
-            "--allow-control",
-            help="Let viewers change set-point, line and codec in flight; every change is recorded.",
-        ),
-    ] = False
+    session: str | None = None
+    """Session name; the same at both ends."""
+    link: str | None = None
+    """zenoh, serial with --port, or a kind from an installed package."""
+    port: str | None = None
+    """Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT."""
+    clock: Clock = "real"
+    telemetry: str = ""
+    """For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket that only this
+    user can open; off beside an insecure link that leaves this machine."""
+    allow_control: bool = False
+    """Let viewers change set-point, line and codec in flight; every change is recorded."""
     out: Out = None
     json: AsJson = False
     verbose: Verbose = False
-    run_folder: Annotated[
-        Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
-    ] = None
-    status: Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")] = "auto"
-
-    def changes(self, **own: Any) -> dict[str, Any]:
-        """Return the configuration that these options, and the command's own, set."""
-        return overrides(**fields_of(self), **own)
+    run_folder: Annotated[Path | None, typer.Option(hidden=True)] = None
+    """Existing folder of the run."""
+    status: Annotated[str, typer.Option(hidden=True)] = "auto"
+    """auto, lines or none."""
 
 
 FIELDS = {
@@ -333,10 +246,11 @@ FIELDS = {
 """Options that set one field of the configuration."""
 
 
-def fields_of(group: NodeOptions | FlightOptions | PlantOptions) -> dict[str, Any]:
-    """Return those of a group of options that `overrides` takes."""
+def fields_of(*groups: Any) -> dict[str, Any]:
+    """Return those of groups of options that `overrides` takes."""
     taken = (*FIELDS, "rig", "sabotage", "settings")
-    return {one.name: getattr(group, one.name) for one in fields(group) if one.name in taken}
+    pairs = [(group, one.name) for group in groups for one in fields(group)]
+    return {name: getattr(group, name) for group, name in pairs if name in taken}
 
 
 def overrides(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as json_module
 import shlex
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,46 +19,37 @@ if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
     from transmitter.rigs.emulator.device import RigEmulator
 
-FormatOption = Annotated[str, typer.Option("--format", help="ascii, cobs, quarc or qsb.")]
-PortOption = Annotated[
-    str,
-    typer.Option(
-        help="pty, pty:LINK (a name for it), /dev/NAME, tcp:HOST:PORT (0: any) to listen, "
-        "tcp-connect:HOST:PORT."
-    ),
-]
+
+@dataclass(frozen=True, slots=True)
+class DeviceOptions:
+    """The emulated device and its line."""
+
+    form: Annotated[str, typer.Option("--format")] = "cobs"
+    """ascii, cobs, quarc or qsb."""
+    port: str = "pty"
+    """pty, pty:LINK (a name for it), /dev/NAME, tcp:HOST:PORT (0: any) to listen,
+    tcp-connect:HOST:PORT."""
+    replay: str | None = None
+    """Recorded flight that drives the encoder instead of a body."""
+    samples_per_s: Annotated[float | None, typer.Option("--rate", min=1.0, max=5000.0)] = None
+    """Samples per second; 480 for cobs."""
+    lines: str = "checked"
+    """ascii: checked (E,...*HH), plain (t_us,c0,c1,c2), counts (c0 c1 c2)."""
+    polled: Annotated[bool, typer.Option()] = False
+    """ascii: answer each line `e` with a sample."""
+    watchdog: Annotated[float, typer.Option(min=0.001, max=3600.0)] = 0.1
+    """Seconds without a command until the outputs turn off."""
+    fault: list[str] | None = None
+    """Such as stuck@5..8, silent@5, unplug@5..7, reset@5, drop=0.01; repeatable."""
+    duration: Annotated[float | None, typer.Option(min=0.0, max=1e7)] = None
+    """Seconds to run; until Ctrl-C if not given."""
 
 
 @spread
 def rig(
     body: options.PlantOptions,
     log: options.LogOptions,
-    form: FormatOption = "cobs",
-    port: PortOption = "pty",
-    replay: Annotated[
-        str | None, typer.Option(help="Recorded flight that drives the encoder instead of a body.")
-    ] = None,
-    samples_per_s: Annotated[
-        float | None,
-        typer.Option("--rate", help="Samples per second; 480 for cobs.", min=1.0, max=5000.0),
-    ] = None,
-    lines: Annotated[
-        str, typer.Option(help="ascii: checked (E,...*HH), plain (t_us,c0,c1,c2), counts (c0 c1 c2).")
-    ] = "checked",
-    polled: Annotated[bool, typer.Option(help="ascii: answer each line `e` with a sample.")] = False,
-    watchdog: Annotated[
-        float,
-        typer.Option(
-            help="Seconds without a command until the outputs turn off.", min=0.001, max=3600.0
-        ),
-    ] = 0.1,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(help="Such as stuck@5..8, silent@5, unplug@5..7, reset@5, drop=0.01; repeatable."),
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Seconds to run; until Ctrl-C if not given.", min=0.0, max=1e7)
-    ] = None,
+    device: DeviceOptions,
     json: options.AsJson = False,
 ) -> None:
     """Emulate a rig in real time: encoders, motors, a watchdog, and faults on request.
@@ -69,18 +60,19 @@ def rig(
     """
     from tenbaud.build.emulator import build_emulator
 
-    config = body.load(rig=None if replay is None else f"replay:{replay}", log=log)
+    replay = None if device.replay is None else f"replay:{device.replay}"
+    config = body.load(rig=replay, log=log)
     emulator = build_emulator(
         config,
-        form,  # type: ignore[arg-type]
-        port,
-        line_form=lines,
-        polled=polled,
-        samples_per_s=samples_per_s,
-        watchdog_s=watchdog,
-        faults=tuple(fault or ()),
+        device.form,  # type: ignore[arg-type]
+        device.port,
+        line_form=device.lines,
+        polled=device.polled,
+        samples_per_s=device.samples_per_s,
+        watchdog_s=device.watchdog,
+        faults=tuple(device.fault or ()),
     )
-    _emulate(emulator, form, duration, json, _flight_words(body, config))
+    _emulate(emulator, device.form, device.duration, json, _flight_words(body, config))
 
 
 def _emulate(

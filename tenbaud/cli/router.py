@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
     from channel.links.security import Invited, Security
@@ -19,27 +21,25 @@ POLL_S = 0.2
 TELL_S = 1.0
 
 
-def router(
-    listen: options.Listen = None,
-    flight: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="With --keys: SESSION=TRANSMITTER,RECEIVER[,VIEWER ...] by the names in their "
-            "certificates; repeatable."
-        ),
-    ] = None,
-    keys: Annotated[Path | None, typer.Option(help="This router's key folder.")] = None,
-    insecure: options.Insecure = False,
-    connections_max: Annotated[
-        int,
-        typer.Option(
-            min=1, max=100_000, help="Maximum number of connected nodes: rigs, receivers, viewers."
-        ),
-    ] = 64,
-    print_config: Annotated[
-        bool, typer.Option("--print-config", help="Print the settings for zenohd and exit.")
-    ] = False,
-) -> None:
+@dataclass(frozen=True, slots=True)
+class RouterOptions:
+    """Who may connect, and where."""
+
+    listen: options.Listen = None
+    flight: list[str] | None = None
+    """With --keys: SESSION=TRANSMITTER,RECEIVER[,VIEWER ...] by the names in their certificates;
+    repeatable."""
+    keys: Path | None = None
+    """This router's key folder."""
+    insecure: options.Insecure = False
+    connections_max: Annotated[int, typer.Option(min=1, max=100_000)] = 64
+    """Maximum number of connected nodes: rigs, receivers, viewers."""
+    print_config: bool = False
+    """Print the settings for zenohd and exit."""
+
+
+@spread
+def router(given: RouterOptions) -> None:
     """Route between two ends that cannot reach each other but both reach this machine.
 
     [dim]tenbaud router --keys keys/hub --listen tls/10.0.0.9:7447 --flight helicopter=rig,desk[/dim]
@@ -50,16 +50,16 @@ def router(
     from channel.links.zenoh.router import router_file
     from tenbaud.cli.addresses import INSECURE
 
-    security = _security(keys, flight or [])
+    security = _security(given.keys, given.flight or [])
     protocol = "tcp" if security is None else "tls"
-    addresses = tuple(listen or [with_protocol(default_endpoint(), protocol)])
-    check_endpoints(addresses, insecure, security is not None)
-    if insecure and security is None:
+    addresses = tuple(given.listen or [with_protocol(default_endpoint(), protocol)])
+    check_endpoints(addresses, given.insecure, security is not None)
+    if given.insecure and security is None:
         typer.echo(INSECURE, err=True)
-    if print_config:
-        typer.echo(router_file(addresses, security, connections_max), nl=False)
+    if given.print_config:
+        typer.echo(router_file(addresses, security, given.connections_max), nl=False)
         return
-    _route(addresses, security, insecure, connections_max)
+    _route(addresses, security, given.insecure, given.connections_max)
 
 
 def _security(keys: Path | None, flights: list[str]) -> Security | None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import shutil
 import sys
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -113,20 +112,11 @@ def presets() -> None:
             typer.echo(for_terminal(line))
 
 
-class Form(StrEnum):
-    """The formats of `convert`."""
-
-    CSV = "csv"
-    MAT = "mat"
-    PARQUET = "parquet"
-    JSON = "json"
-    MCAP = "mcap"
-
-
 def convert(
     run: RunArgument,
     to: Annotated[
-        Form, typer.Option(help="mcap: one file for Foxglove and PlotJuggler, with layouts.")
+        Literal["csv", "mat", "parquet", "json", "mcap"],
+        typer.Option(help="mcap: one file for Foxglove and PlotJuggler, with layouts."),
     ],
     out: Annotated[
         Path | None,
@@ -146,7 +136,7 @@ def convert(
     opened = Run(run)
     for note in opened.notes:
         typer.echo(f"note: {note}", err=True)
-    for path in convert_run(opened, to.value, out, overwrite=force):
+    for path in convert_run(opened, to, out, overwrite=force):
         typer.echo(str(path))
 
 

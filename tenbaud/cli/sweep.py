@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 from tenbaud.cli.waiting import Waiting
 from tenbaud.studies.progress import progress_bar
 
@@ -18,28 +20,28 @@ if TYPE_CHECKING:
     from tenbaud.studies.table import Results
 
 
-def sweep(
-    study: Annotated[Path, typer.Argument(help="Study file (TOML); see docs/studies.md.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of the results; studies/<name> if not given. Resumes an existing study."
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Processes on this machine; default: all cores.")
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.")
-    ] = None,
-    seeds: Annotated[
-        int | None,
-        typer.Option(min=1, max=1_000_000, help="Seeds of each point, instead of the study's."),
-    ] = None,
-    allow_code: options.AllowCode = False,
-    plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
-    as_json: options.AsJson = False,
-) -> None:
+@dataclass(frozen=True, slots=True)
+class SweepOptions:
+    """The study, and where it is flown."""
+
+    study: Annotated[Path, typer.Argument()]
+    """Study file (TOML); see docs/studies.md."""
+    out: Path | None = None
+    """Folder of the results; studies/<name> if not given. Resumes an existing study."""
+    workers: Annotated[int | None, typer.Option(min=1, max=1024)] = None
+    """Processes on this machine; default: all cores."""
+    scheduler: str | None = None
+    """Dask scheduler to fly on, such as tcp://HOST:8786."""
+    seeds: Annotated[int | None, typer.Option(min=1, max=1_000_000)] = None
+    """Seeds of each point, instead of the study's."""
+    allow_code: options.AllowCode = False
+    plots: bool = True
+    """Draw the plots."""
+    as_json: options.AsJson = False
+
+
+@spread
+def sweep(given: SweepOptions) -> None:
     """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
 
     After a stop or a kill the same command continues with the missing flights.
@@ -49,14 +51,14 @@ def sweep(
     from tenbaud.studies.study import read_study
     from tenbaud.studies.table import Results
 
-    if scheduler is not None and workers is not None:
+    if given.scheduler is not None and given.workers is not None:
         raise StudyError("--workers is of this machine and --scheduler of a cluster: give one of them")
-    what = read_study(study, seeds, allow_code=allow_code)
+    what = read_study(given.study, given.seeds, allow_code=given.allow_code)
     name = what.file.name
-    folder = out or Path("studies") / name
+    folder = given.out or Path("studies") / name
     results = Results(what, folder)
     try:
-        table = _fly(what, results, workers or os.cpu_count() or 1, scheduler)
+        table = _fly(what, results, given.workers or os.cpu_count() or 1, given.scheduler)
     except KeyboardInterrupt:
         kept = folder.is_dir() and any(folder.iterdir())
         if kept:
@@ -66,7 +68,7 @@ def sweep(
             remove(folder)
         typer.echo(said, err=True)
         raise
-    drawn = _draw(table, what, folder) if plots else []
+    drawn = _draw(table, what, folder) if given.plots else []
     why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
     slow = Counter(one for one in table["not_compiled"].to_pylist() if one)
     summary = {
@@ -79,7 +81,7 @@ def sweep(
         "results": str(results.table_path),
         "plots": [str(path) for path in drawn],
     }
-    if as_json:
+    if given.as_json:
         options.print_json(summary)
         return
     _tell(summary, why, slow)

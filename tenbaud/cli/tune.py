@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from enum import StrEnum
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -19,100 +19,54 @@ if TYPE_CHECKING:
     from tenbaud.studies.tuning import Tuned
 
 
-class MethodOption(StrEnum):
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """What is fitted, and on which flights."""
+
+    free: list[str] | None = None
+    """Constant of coder or model to fit and its range, such as coder.decay=0.7..0.99 or
+    coder.minimum_range_rad=0.003..0.1:log; repeatable. Not given: the usual ones of the coder, its
+    gains and its range."""
+    model: bool = False
+    """Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well."""
+    seeds: Annotated[int, typer.Option(min=1, max=100_000)] = 6
+    """Simulated flights for the fit."""
+    test_seeds: Annotated[int, typer.Option(min=1, max=100_000)] = 12
+    """Simulated flights for validation, with the next seeds."""
+    train_share: Annotated[float, typer.Option(min=0.05, max=0.95)] = 0.5
+    """Share of a recorded flight for the fit; the rest is for validation."""
+    method: Literal["cma-es", "nelder-mead"] = "cma-es"
     """Search method."""
-
-    EVOLUTION = "cma-es"
-    SIMPLEX = "nelder-mead"
-
-
-Out = Annotated[Path, typer.Option(help="New file for the fitted preset.")]
-Rig = Annotated[
-    str | None,
-    typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.", show_default=False),
-]
-Free = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Constant of coder or model to fit and its range, such as coder.decay=0.7..0.99 or "
-        "coder.minimum_range_rad=0.003..0.1:log; repeatable. Not given: the usual ones of the coder, "
-        "its gains and its range."
-    ),
-]
-Model = Annotated[
-    bool,
-    typer.Option(
-        "--model", help="Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well."
-    ),
-]
-Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="Simulated flights for the fit.")]
-TestSeeds = Annotated[
-    int,
-    typer.Option(min=1, max=100_000, help="Simulated flights for validation, with the next seeds."),
-]
-TrainShare = Annotated[
-    float,
-    typer.Option(
-        min=0.05, max=0.95, help="Share of a recorded flight for the fit; the rest is for validation."
-    ),
-]
-Method = Annotated[MethodOption, typer.Option(help="Search method.")]
-Evaluations = Annotated[
-    int,
-    typer.Option(
-        min=1,
-        max=10_000_000,
-        help="Maximum number of parameter sets, including the configured one; each is flown on all "
-        "flights for the fit.",
-    ),
-]
-Scales = Annotated[
-    str,
-    typer.Option(help="Recorded flights: sizes at which the record is flown for the fit."),
-]
-Shoves = Annotated[
-    float,
-    typer.Option(
-        min=0.0,
-        max=100.0,
-        help="Recorded flights: rms of the random pushes added for the fit, as a share of the record's "
-        "motion; 0: none.",
-    ),
-]
-Phases = Annotated[
-    int,
-    typer.Option(
-        min=1,
-        max=10_000,
-        help="Recorded flights: maximum number of sample phases for the fit; the validation flies all.",
-    ),
-]
-Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")]
+    evaluations: Annotated[int, typer.Option(min=1, max=10_000_000)] = 600
+    """Maximum number of parameter sets, including the configured one; each is flown on all flights for
+    the fit."""
+    scales: str = "0.6,1,2"
+    """Recorded flights: sizes at which the record is flown for the fit."""
+    shoves: Annotated[float, typer.Option(min=0.0, max=100.0)] = 1.0
+    """Recorded flights: rms of the random pushes added for the fit, as a share of the record's motion;
+    0: none."""
+    phases: Annotated[int, typer.Option(min=1, max=10_000)] = 5
+    """Recorded flights: maximum number of sample phases for the fit; the validation flies all."""
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1)] = 1
+    """Seed of the search."""
 
 
 @spread
 def tune(
-    out: Out,
+    *,
+    out: Annotated[Path, typer.Option(help="New file for the fitted preset.")],
     log: LogOptions,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
-    rig: Rig = None,
+    rig: Annotated[
+        str | None, typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.")
+    ] = None,
     duration: options.Duration = None,
     mismatch: options.Mismatch = None,
     disturbance: options.Disturbance = None,
     impair: options.Impair = None,
     settings: options.Settings = None,
-    free: Free = None,
-    model: Model = False,
-    seeds: Seeds = 6,
-    test_seeds: TestSeeds = 12,
-    train_share: TrainShare = 0.5,
-    method: Method = MethodOption.EVOLUTION,
-    evaluations: Evaluations = 600,
-    scales: Scales = "0.6,1,2",
-    shoves: Shoves = 1.0,
-    phases: Phases = 5,
-    seed: Seed = 1,
+    fitting: FitOptions,
     allow_code: options.AllowCode = False,
     as_json: options.AsJson = False,
 ) -> None:
@@ -141,22 +95,28 @@ def tune(
     _make_room(out)
     plant: dict[str, Any] = {"rig": rig, "log": log, "mismatch": mismatch, "disturbance": disturbance}
     overrides = options.overrides(duration=duration, impair=impair, settings=settings, **plant)
-    split = split_of(seeds, test_seeds, train_share)
-    augment = Augment(_sizes(scales), shoves, phases, seed)
     tuning = Tuning(
-        preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code, augment
+        preset,
+        config,
+        overrides,
+        {},
+        split_of(fitting.seeds, fitting.test_seeds, fitting.train_share),
+        fitting.method,
+        fitting.evaluations,
+        fitting.seed,
+        allow_code,
+        Augment(_sizes(fitting.scales), fitting.shoves, fitting.phases, fitting.seed),
     )
     start = tuning.config({})
-    tuning.free.update(free_ranges(start, _named(free or []), model=model))
+    tuning.free.update(free_ranges(start, _named(fitting.free or []), model=fitting.model))
     _need_chance(start)
     units = units_of(start)
     with StopFlag() as stop, progress_bar("tune", counted=True) as update:
-        tuned = fit(
-            tuning, lambda n, error: update(n, evaluations, f"best {shown(error, units)}"), stop
-        )
+        most = fitting.evaluations
+        tuned = fit(tuning, lambda n, error: update(n, most, f"best {shown(error, units)}"), stop)
     _leave(tuned, preset_text(tuning, tuned), out, as_json)
     if stop.raised:
-        typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
+        typer.echo(f"stopped after {tuned.evaluations} of {most} evaluations", err=True)
         raise typer.Exit(ExitCode.INTERRUPTED)
 
 
@@ -198,25 +158,17 @@ def _make_room(out: Path) -> None:
 def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
     """Print the result, and write it."""
     from tenbaud.files.whole import write_whole
+    from tenbaud.studies.tuning import report
 
     if not as_json:
-        _tell(tuned)
+        constants = [f"{name:36} {value:.6g}" for name, value in tuned.values.items()]
+        typer.echo("\n".join([*constants, *report(tuned)]))
     # After the figures, so that a full disk does not lose them.
     write_whole(out, preset)
     if as_json:
         options.print_json({**tuned._asdict(), "preset_file": str(out)})
     else:
         typer.echo(f"{out}: fly it with --config {out}")
-
-
-def _tell(tuned: Tuned) -> None:
-    """Print constants and errors."""
-    from tenbaud.studies.tuning import report
-
-    for name, value in tuned.values.items():
-        typer.echo(f"{name:36} {value:.6g}")
-    for line in report(tuned):
-        typer.echo(line)
 
 
 def _sizes(text: str) -> tuple[float, ...]:

@@ -2,59 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
     from tenbaud.view.feed import Feed
     from tenbaud.view.server import Address
 
-Host = Annotated[
-    str | None,
-    typer.Option(
-        help="Address of the page; others than loopback need --insecure. Not given: 127.0.0.1, or "
-        "::1 where there is no IPv4."
-    ),
-]
+
+@dataclass(frozen=True, slots=True)
+class PageOptions:
+    """What the page shows, and where it is served."""
+
+    runs: Annotated[list[Path] | None, typer.Argument(metavar="RUN")] = None
+    """Folders of finished runs, up to four of the same outputs, or recordings: the page replays them,
+    laid over each other. Not given: a live flight."""
+    connect: list[str] | None = None
+    """Telemetry endpoint of an end (its --telemetry); repeatable. Not given: flights of this user on
+    this machine are found."""
+    keys: Path | None = None
+    """This viewer's key folder (`tenbaud keys`), for tls endpoints."""
+    session: str = "**"
+    """Session name; any if not given."""
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 8710
+    """Of the page; 0: any free one."""
+    host: str | None = None
+    """Address of the page; others than loopback need --insecure. Not given: 127.0.0.1, or ::1 where
+    there is no IPv4."""
+    open_browser: options.OpenBrowser = False
+    insecure: Annotated[bool, typer.Option()] = False
+    """Allow other machines to reach the page, which is not encrypted."""
+    view_only: bool = False
+    """Print only the view-only address."""
+    schema: bool = False
+    """Print the JSON schema of the telemetry and end."""
 
 
-def view(
-    runs: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="RUN",
-            help="Folders of finished runs, up to four of the same outputs, or recordings: the page "
-            "replays them, laid over each other. Not given: a live flight.",
-        ),
-    ] = None,
-    connect: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Telemetry endpoint of an end (its --telemetry); repeatable. Not given: flights of "
-            "this user on this machine are found."
-        ),
-    ] = None,
-    keys: Annotated[
-        Path | None, typer.Option(help="This viewer's key folder (`tenbaud keys`), for tls endpoints.")
-    ] = None,
-    session: Annotated[str, typer.Option(help="Session name; any if not given.")] = "**",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any free one.")] = 8710,
-    host: Host = None,
-    open_browser: options.OpenBrowser = False,
-    insecure: Annotated[
-        bool, typer.Option(help="Allow other machines to reach the page, which is not encrypted.")
-    ] = False,
-    view_only: Annotated[
-        bool, typer.Option("--view-only", help="Print only the view-only address.")
-    ] = False,
-    schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON schema of the telemetry and end.")
-    ] = False,
-) -> None:
+@spread
+def view(page: PageOptions) -> None:
     """Serve a page of a flight, for the browser: picture, curves, bits, lockstep, controls.
 
     With RUN the same page replays finished flights: scrub, play at any speed, compare. Of a live
@@ -69,28 +60,28 @@ def view(
 
     [dim]tenbaud view --keys keys/desk --connect tls/10.0.0.2:7448[/dim]
     """
-    if schema:
+    if page.schema:
         from tenbaud.telemetry.schema import schema_json
 
         options.print_json(schema_json())
         return
     from channel.links.endpoints import loopback_host
-    from tenbaud.view.server import Address, free_port
+    from tenbaud.view.server import Address
 
     # As in a URL, or bare.
-    host = loopback_host() if host is None else host.removeprefix("[").removesuffix("]")
-    address = Address(host, port or free_port(host), insecure)
-    if runs:
-        if connect or keys or session != "**":
+    host = loopback_host() if page.host is None else page.host.removeprefix("[").removesuffix("]")
+    address = Address(host, page.port, page.insecure)
+    if page.runs:
+        if page.connect or page.keys or page.session != "**":
             raise typer.BadParameter(
                 "--connect, --keys and --session are for live flights; give no RUN"
             )
-        _replay(runs, address, open_browser)
+        _replay(page.runs, address, page.open_browser)
         return
-    feed = _feed(tuple(connect or ()), session, keys)
+    feed = _feed(tuple(page.connect or ()), page.session, page.keys)
     from tenbaud.view.server import serve
 
-    serve(feed, address, open_browser=open_browser, view_only=view_only)
+    serve(feed, address, open_browser=page.open_browser, view_only=page.view_only)
 
 
 def _feed(connect: tuple[str, ...], session: str, keys: Path | None) -> Feed:
@@ -121,7 +112,7 @@ def _replay(runs: list[Path], address: Address, open_browser: bool) -> None:
     from tenbaud.view.replay import serve_recorded
 
     # What is wrong with the port is said before minutes of recordings are read.
-    address.check()
+    address = address.checked()
     flights = recorded_flights([Run(one) for one in runs])
     Interruptions.require_none()
     serve_recorded(flights, address, open_browser=open_browser)

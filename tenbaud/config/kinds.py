@@ -72,6 +72,9 @@ CONTROLLERS = Registry(
 )
 
 
+REGISTRIES = {"model": MODELS, "coder": CODERS, "plant": PLANTS, "controller": CONTROLLERS}
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """A kind of model or coder."""

@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,15 @@ _SPLIT = re.compile(r",\n\s+")
 
 class ConfigError(TenbaudError):
     """A configuration that cannot be used; the text names file, field, value and allowed range."""
+
+
+@contextmanager
+def config_errors(where: str = "") -> Iterator[None]:
+    """Within the `with`, a ValueError becomes a ConfigError that begins with `where`."""
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(f"{where}: {error}" if where else str(error)) from error
 
 
 def preset_names(what: str = "preset") -> list[str]:
@@ -211,7 +221,7 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
     kind = place.pop(1) if len(place) > 1 and place[1] in _kinds(place[0]) else None
     name = ".".join(place) or "(whole file)"
     if detail["type"] in ("extra_forbidden", "model_type"):
-        return name, f"unknown field{_nearest(place, kind)}"
+        return name, _nearest(place, kind)
     if detail["type"] == "union_tag_invalid":
         tag = detail["ctx"]["tag"]
         hint = (MODELS if name == "model" else CODERS).hint(str(tag))
@@ -239,7 +249,16 @@ def _nearest(place: list[str], kind: str | None) -> str:
     for part in sections:
         section = fields[part].annotation if part in fields else None
         fields = getattr(section, "model_fields", {})
+    if place[-1] in fields:
+        within = getattr(fields[place[-1]].annotation, "model_fields", {})
+        same = [
+            f"{name}.{place[-1]}"
+            for name, one in FlightConfig.model_fields.items()
+            if place[-1] in getattr(one.annotation, "model_fields", {})
+        ]
+        other = f"; or do you mean {' or '.join(same)}?" if same else ""
+        return f"a section with the fields {', '.join(within)}; set one of them{other}"
     near = difflib.get_close_matches(place[-1], list(fields), 1)
     if near:
-        return f"; did you mean {near[0]}?"
-    return f"; known here: {', '.join(fields)}" if fields else ""
+        return f"unknown field; did you mean {near[0]}?"
+    return f"unknown field; known here: {', '.join(fields)}" if fields else "unknown field"

@@ -23,11 +23,6 @@ class ModelSection(KindSection):
     start: tuple[Factor, ...] = ()
     """state that both ends begin with; empty: at rest, a linear model's operating state"""
 
-    @property
-    def stops(self) -> dict[str, tuple[float, float]]:
-        """Return the range of each output that has one, beyond which no set-point may be."""
-        return {}
-
 
 class PitchModelSection(ModelSection):
     """The pitch model (11),(12) of both codecs."""

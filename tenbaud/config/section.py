@@ -56,6 +56,11 @@ class KindSection(Section):
 
     kind: str
 
+    @property
+    def stops(self) -> dict[str, tuple[float, float]]:
+        """Return the range of each output that has one, beyond which no set-point may be."""
+        return {}
+
 
 class OutsideSection(KindSection):
     """An external class: named here, or offered by an installed package under its name."""

@@ -27,7 +27,7 @@ from tenbaud.flight.report import write_up
 from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import joined
-from tenbaud.flight.viewing import Viewing, ViewOptions, page_beside
+from tenbaud.flight.viewing import ViewOptions, Views, page_beside, words_of
 from tenbaud.recording.folder import RunFolder
 from tenbaud.sentences.flown import Summary
 
@@ -65,14 +65,14 @@ def fly_demo(
     where there is one. `drawing` shows a flight within this process.
     """
     write_whole(folder.config, dump_config(agreement.config))
-    with StopFlag() as stop, page_beside(view, stop, pace) as viewing:
+    with StopFlag() as stop, page_beside(view, stop, pace) as views:
         if agreement.link.in_process:
             flown = replace(agreement, live=view is not None)
-            outcome, upper, lower = run_in_memory(flown, folder, status, viewing, drawing)
+            outcome, upper, lower = run_in_memory(flown, folder, status, views, drawing)
             messages = [] if outcome.code is ExitCode.OK else [outcome.text]
             result = DemoResult(joined(upper, lower), outcome.code, messages)
         else:
-            result = _fly_processes(agreement, folder, on_status, viewing, stop)
+            result = _fly_processes(agreement, folder, on_status, views, stop)
     on_status({"role": "run", "phase": "writing its results"})
     usual = None
     if compare and result.code is ExitCode.OK and view is None:
@@ -89,11 +89,11 @@ def fly_demo(
 
 
 def _fly_processes(
-    agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing, stop: StopFlag
+    agreement: Agreement, folder: RunFolder, on_status: OnStatus, views: Views, stop: StopFlag
 ) -> DemoResult:
     with agreement.link.meeting(agreement.config.link) as meetings:
-        up = _words(meetings[0]) + viewing.words("transmitter")
-        down = _words(meetings[1]) + viewing.words("receiver")
+        up = _words(meetings[0]) + words_of("transmitter", views["transmitter"])
+        down = _words(meetings[1]) + words_of("receiver", views["receiver"])
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)
         ends = (transmitter, receiver)

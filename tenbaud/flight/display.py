@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Self
 
 from tenbaud.flight.status import Status, StatusMode, status_line
@@ -86,11 +87,10 @@ class StatusReporter:
             self._thread.join()
 
     def _run(self) -> None:
-        if self._mode == "auto":
-            with StatusDisplay() as display:
-                while not self._stop.wait(PERIOD_S):
+        with StatusDisplay() if self._mode == "auto" else nullcontext() as display:
+            while not self._stop.wait(PERIOD_S):
+                if display is not None:
                     display.show(self._look())
-            return
-        while not self._stop.wait(PERIOD_S):
-            sys.stderr.write(json.dumps(self._look()) + "\n")
-            sys.stderr.flush()
+                    continue
+                sys.stderr.write(json.dumps(self._look()) + "\n")
+                sys.stderr.flush()

@@ -5,12 +5,11 @@ from __future__ import annotations
 import gc
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.codec.codec import Word
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -28,14 +27,16 @@ from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import (
+    counted,
     gap_part,
     link_part,
     narrow_part,
     receiver_part,
+    recording_part,
     transmitter_part,
 )
 from tenbaud.flight.trouble import Trouble
-from tenbaud.flight.viewing import ALONE, ENDS, Viewing
+from tenbaud.flight.viewing import ENDS, Views, viewed
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.overview import OverviewRecorder
@@ -44,7 +45,6 @@ from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences.flown import Summary
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
-from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from transmitter.loops.virtual import LinkPeer
 
 SWITCH_INTERVAL_S = 0.0002
@@ -95,7 +95,9 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
-        telemetry = _telemetry(agreement, "transmitter", recorder, endpoints)
+        telemetry = TelemetryEnd(
+            agreement, "transmitter", recorder, endpoints.telemetry, endpoints.node()
+        )
         with (
             refusals(endpoints) as refused,
             open_link(agreement, "transmitter", endpoints, stop) as link,
@@ -125,7 +127,7 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
-        telemetry = _telemetry(agreement, "receiver", recorder, endpoints)
+        telemetry = TelemetryEnd(agreement, "receiver", recorder, endpoints.telemetry, endpoints.node())
         with refusals(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
             endpoint = build_receiver(
@@ -162,7 +164,7 @@ def run_in_memory(
     agreement: Agreement,
     folder: RunFolder,
     status: StatusMode,
-    viewing: Viewing = ALONE,
+    views: Views | None = None,
     drawing: NotebookDrawing | None = None,
 ) -> tuple[Outcome, Summary, Summary]:
     """Fly both ends in this process, on the virtual clock, without a link."""
@@ -173,15 +175,25 @@ def run_in_memory(
         rows: tuple[Recorder, Recorder] = recorder, receiver_recorder
         if drawing is not None:
             rows = drawing.recorders(*rows)
-        looked_at = [Endpoints(telemetry=viewing.options(role)) for role in ENDS]
-        up = _telemetry(agreement, "transmitter", rows[0], looked_at[0])
-        down = _telemetry(agreement, "receiver", rows[1], looked_at[1])
+        views = views or viewed()
+        up, down = (
+            TelemetryEnd(agreement, role, own, views[role], {})
+            for role, own in zip(ENDS, rows, strict=True)
+        )
         run = transmit.prepare(agreement, up.recorder, DATAGRAM)
         endpoint = build_receiver(agreement, down.recorder, DATAGRAM, references=down.steering)
         obeyed = down.fly_receiver(endpoint, stop)
-        live = up.fly_transmitter(run, stop, lambda: _obey(obeyed))
-        if viewing.endpoints or drawing is not None:
-            run.node.before_every_tick(_each_tick(live, obeyed, drawing))
+        # Also while the flight is paused.
+        live = up.fly_transmitter(run, stop, obeyed)
+
+        def act(tick: int) -> None:
+            obeyed()
+            live.at_tick(tick)
+            if drawing is not None:
+                drawing.at_tick(tick)
+
+        if views["receiver"].control or drawing is not None:
+            run.node.before_every_tick(act)
         with (
             up.publishing(lambda tap: TransmitterComposer(run, tap, live)),
             down.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, obeyed)),
@@ -198,25 +210,6 @@ def run_in_memory(
         upper = transmitter_part(run, outcome)
         lower = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(upper, recorder), lower
-
-
-def _obey(receiver: LiveReceiver) -> None:
-    """Have the receiver's commands take hold, also while the flight is paused."""
-    receiver()
-
-
-def _each_tick(
-    live: LiveTransmitter, obeyed: LiveReceiver, drawing: NotebookDrawing | None
-) -> Callable[[int], None]:
-    """Return what both ends have done before every tick of a flight that is looked at."""
-
-    def act(tick: int) -> None:
-        _obey(obeyed)
-        live.at_tick(tick)
-        if drawing is not None:
-            drawing.at_tick(tick)
-
-    return act
 
 
 def open_recorder(
@@ -251,27 +244,26 @@ def open_recorder(
 
 def transmitter_status(run: TransmitterRun) -> Status:
     """Return the status of a running transmitter, for people."""
-    node = run.node
+    node, session = run.node, run.node.session
     coder = run.agreement.codec.coder
     tick_s = run.agreement.terms.tick_ns / 1e9
+    # Copied in one go: the flight's thread may add to it meanwhile.
+    words = tuple(node.scores.last_words)
     return {
         "role": "transmitter",
-        "phase": node.session.phase.value,
+        "phase": session.phase.value,
         "tick": node.tick,
         "of_ticks": run.agreement.flight_ticks,
         "time_s": node.tick * tick_s,
         "outputs": outputs_status(
             run.agreement.signals,
             [one.last for one in node.scores.outputs],
-            coder.ranges(node.session.confirmed_state.coder),
+            coder.ranges(session.confirmed_state.coder),
             [one.last_coded_error for one in node.scores.outputs],
         ),
-        "erasures": node.session.counts["erasures"],
-        "desyncs": node.session.counts["desyncs"],
-        "digest_checks": node.session.counts["digest_checks"],
-        "rejoins": node.session.counts["rejoins"],
-        # Copied in one go: the flight's thread may add to it meanwhile.
-        **_tape(tuple(node.scores.last_words)),
+        **counted(session, "erasures", "desyncs", "digest_checks", "rejoins"),
+        "words": [word for word, _ in words],
+        "about": [about for _, about in words],
         "guard": node.guard.state.value,
         "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
@@ -287,14 +279,10 @@ def _narrow(run: TransmitterRun) -> Status:
     listed = run.node.session.following.hypotheses  # type: ignore[attr-defined]
     now = {
         "unconfirmed": listed.next_heard - listed.next_confirmed,
-        "copies": listed.size,
+        "hypotheses": listed.size,
         "baud": run.endpoint.down_baud.baud,
     }
     return {"narrow": part["narrow"] | now}
-
-
-def _tape(words: Sequence[tuple[Word, tuple[int, ...] | None]]) -> Status:
-    return {"words": [word for word, _ in words], "about": [about for _, about in words]}
 
 
 def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
@@ -328,20 +316,6 @@ def _end(
         yield recorder, stop
 
 
-def _telemetry(
-    agreement: Agreement, role: Role, recorder: Recorder, endpoints: Endpoints
-) -> TelemetryEnd:
-    return TelemetryEnd(
-        agreement,
-        role,
-        recorder,
-        endpoints.telemetry,
-        endpoints.listen + endpoints.connect + endpoints.router,
-        endpoints.insecure,
-        endpoints.security,
-    )
-
-
 def _peer(run: TransmitterRun, link: Link, stop: Stop, recorder: McapRecorder) -> LinkPeer | None:
     """Return the receiver as a virtual flight steps it; None on a real clock."""
     if run.agreement.clock == "real":
@@ -365,9 +339,4 @@ def _guarded(fly: Callable[[], Outcome]) -> Outcome:
 def _with_recording(summary: Summary, recorder: McapRecorder) -> Summary:
     """Close the recording and add its outcome."""
     recorder.close()
-    return {
-        **summary,
-        "recording_rows": recorder.rows_written,
-        "recording_rows_lost": recorder.rows_dropped,
-        "recording_error": recorder.error,
-    }
+    return summary | recording_part(recorder)

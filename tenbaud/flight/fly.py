@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike
 
 from channel.codec.codec import Coder, Model
 from channel.errors import TenbaudError
-from channel.links.endpoints import loopback_host
 from channel.protocol.terms import Clock, Rung
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.codec import build_model
 from tenbaud.build.controllers import controller_context
-from tenbaud.build.ends import check_parts, check_rig, check_sabotage
+from tenbaud.build.ends import check_flight
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
@@ -29,7 +28,16 @@ from tenbaud.build.recorded import flight_config
 from tenbaud.build.rig import plant_context
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.deprecated import with_current_names
-from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
+from tenbaud.config.kinds import REGISTRIES
+from tenbaud.config.load import (
+    OWN,
+    ConfigError,
+    config_errors,
+    load_config,
+    merged,
+    merged_values,
+    nested,
+)
 from tenbaud.config.outside_code import object_kind
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
@@ -40,20 +48,12 @@ from tenbaud.flight.demo import fly_demo
 from tenbaud.flight.display import StatusDisplay
 from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.report import removed_unless_begun
-from tenbaud.flight.status import Status
 from tenbaud.flight.viewing import ViewOptions
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder, create_run_folder
 from tenbaud.recording.notebook import in_notebook
 from tenbaud.recording.run import Run
 
-FIELDS = {
-    "model": "model.kind",
-    "coder": "coder.kind",
-    "plant": "transmitter.plant.kind",
-    "controller": "receiver.controller",
-}
-"""The setting that names each part."""
 REFERENCE_NAME = "reference.csv"
 
 
@@ -135,16 +135,12 @@ def fly(
         agreement = _agreement(loaded, clock, parts, accept_risk)
         looks = _looks(agreement, show, pace)
     with StatusDisplay() if show and sys.stderr.isatty() else nullcontext() as display:
-        on_status = display.show if display is not None else _unseen
-        result = fly_demo(agreement, folder, on_status, draw=draw, status="none", **looks)
+        show_status = display.show if display is not None else lambda _status: None
+        result = fly_demo(agreement, folder, show_status, draw=draw, status="none", **looks)
     if result.code:
         texts = dict.fromkeys([str(result.summary["outcome"]), *result.messages])
         raise FlightFailed("\n  ".join(texts), folder.path)
     return Run(folder.path)
-
-
-def _unseen(status: Status) -> None:
-    """Show nothing."""
 
 
 def _looks(agreement: Agreement, show: bool, pace: float | None) -> dict[str, Any]:
@@ -157,10 +153,7 @@ def _looks(agreement: Agreement, show: bool, pace: float | None) -> dict[str, An
         return {"drawing": NotebookDrawing(agreement), "pace": pace}
     if not show:
         return {"pace": pace}
-    from tenbaud.view.server import free_port, require_nicegui
-
-    require_nicegui()
-    view = ViewOptions(free_port(loopback_host()), open_browser=True)
+    view = ViewOptions.checked(port=0, open_browser=True)
     return {"view": view, "pace": pace or (1.0 if agreement.clock == "virtual" else None)}
 
 
@@ -178,7 +171,7 @@ def _names(parts: Mapping[str, Any], link: str) -> dict[str, str]:
             'others; use link="memory", or name a class as "module:Class"'
         )
     return {
-        FIELDS[name]: part if isinstance(part, str) else object_kind(part)
+        REGISTRIES[name].field: part if isinstance(part, str) else object_kind(part)
         for name, part in parts.items()
     }
 
@@ -260,10 +253,8 @@ def _agreement(
     plant, controller = parts.get("plant"), parts.get("controller")
     objects = _objects(parts)
     if inspect.isclass(controller):
-        try:
+        with config_errors():
             asked = controller_context(loaded, build_model(loaded, objects))
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
         built = build_class("the controller", controller, asked, {}, Controller)
         objects = replace(objects, controller=built, has_own_set_points=False)
     agreement = agree(loaded, clock, objects)
@@ -274,7 +265,5 @@ def _agreement(
     elif inspect.isclass(plant):
         made = replace(made, plant=build_class("the plant", plant, context, {}, Plant))
     agreement = replace(agreement, parts=made)
-    check_parts(loaded, made)
-    check_sabotage(agreement)
-    check_rig(loaded, accept_risk, made)
+    check_flight(agreement, accept_risk)
     return agreement

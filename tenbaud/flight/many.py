@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from channel.errors import FrameError, LinkLost
@@ -29,7 +29,7 @@ from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.rate_limited_log import RateLimitedLog
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
-from tenbaud.flight.summary import receiver_part
+from tenbaud.flight.summary import receiver_part, recording_part
 from tenbaud.recording.folder import RunFolder, make_numbered
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
@@ -52,7 +52,6 @@ class Flight:
     agreement: Agreement
     folder: RunFolder
     recorder: McapRecorder
-    summary: Summary = field(default_factory=dict)
 
 
 class ManyHost:
@@ -127,8 +126,13 @@ class ManyHost:
 
     def ended(self, served: Served, error: Exception | None) -> None:
         """End a flight: tell its transmitter now, and have its files finished."""
+        ending = Ending.STOPPED if error is None else Ending.FAILED
+        if isinstance(error, LinkLost):
+            ending = Ending.LINK_LOST
         try:
-            self._say_goodbye(served, error)
+            for message in served.endpoint.bye(End(ending)):
+                self._hub.send(served.name, message)
+            served.endpoint.session.flush_records()
         except Exception as problem:  # what has ended it may stand in the way of a farewell too
             error = error or problem
         self.counts["messages_dropped"] += served.dropped
@@ -137,14 +141,6 @@ class ManyHost:
         # Until its files are finished the name stays taken, and a new flight waits.
         self._opening.add(served.name)
         self._worker.submit(self._finish, flight, served, error)
-
-    def _say_goodbye(self, served: Served, error: Exception | None) -> None:
-        ending = Ending.STOPPED if error is None else Ending.FAILED
-        if isinstance(error, LinkLost):
-            ending = Ending.LINK_LOST
-        for message in served.endpoint.bye(End(ending)):
-            self._hub.send(served.name, message)
-        served.endpoint.session.flush_records()
 
     def close(self) -> None:
         """Wait until all files are finished; for after the loop."""
@@ -207,24 +203,23 @@ class ManyHost:
         return Served(name, endpoint, link.peer_timeout_s, allowed_per_s, data)
 
     def _finish(self, flight: Flight, served: Served, error: Exception | None) -> None:
+        summary: Summary = {}
         try:
             endpoint = served.endpoint
             outcome = _outcome(flight.agreement, served, error)
             flight.recorder.close()
-            flight.summary = {
+            summary = {
                 "session": flight.name,
                 "folder": str(flight.folder.path),
                 **receiver_part(flight.agreement, endpoint, outcome),
                 "messages_dropped": served.dropped,
-                "recording_rows": flight.recorder.rows_written,
-                "recording_rows_lost": flight.recorder.rows_dropped,
-                "recording_error": flight.recorder.error,
+                **recording_part(flight.recorder),
             }
             if flight.recorder.error is not None:
                 self.counts["not_written"] += 1
                 self._log(f"{flight.name}: {flight.recorder.error}")
-            write_summary(flight.folder, flight.summary)
-            self._log(f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}")
+            write_summary(flight.folder, summary)
+            self._log(f"{flight.name}: ended after {summary['samples']} samples: {outcome.text}")
         except WriteError as problem:
             self.counts["not_written"] += 1
             self._log(f"{flight.name}: {problem}")
@@ -233,8 +228,8 @@ class ManyHost:
             self._hub.leave(flight.name)
             self._opening.discard(flight.name)
             # Last: who sees the flight ended may count on its place being free.
-            if flight.summary:
-                self.summaries.append(flight.summary)
+            if summary:
+                self.summaries.append(summary)
 
 
 def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> Outcome:

@@ -7,7 +7,6 @@ everywhere.
 from __future__ import annotations
 
 import re
-import threading
 from typing import Self
 
 from rich.console import Console, Group, RenderableType
@@ -33,20 +32,20 @@ class ManyStatus:
         self._console = Console(stderr=True)
         self._live: Live | None = None
         if shown and self._console.is_terminal:
-            self._live = Live(self.table(), console=self._console, auto_refresh=False, transient=True)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="status", daemon=True)
+            self._live = Live(
+                get_renderable=self.table,
+                console=self._console,
+                refresh_per_second=1.0 / PERIOD_S,
+                transient=True,
+            )
 
     def __enter__(self) -> Self:
         if self._live is not None:
             self._live.start()
-            self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stop.set()
         if self._live is not None:
-            self._thread.join()
             self._live.stop()
 
     def tell(self, text: str) -> None:
@@ -75,11 +74,6 @@ class ManyStatus:
         loop = "" if late is None else f", loop late p99 {late:.2f} ms"
         hidden = f", {len(served) - room} not shown" if len(served) > room else ""
         return Group(f"{len(served)} rigs of {self._pattern}{loop}{hidden}", table)
-
-    def _run(self) -> None:
-        while not self._stop.wait(PERIOD_S):
-            if self._live is not None:
-                self._live.update(self.table(), refresh=True)
 
 
 def _calmness(served: Served) -> tuple[bool, int, list[str]]:

@@ -180,19 +180,17 @@ class MemoryFlight:
         if self.transmitter.phase is Phase.GREETING:
             raise LinkLost("no request for a session came through the line")
         flown = self.loop.run(ticks)
-        ended_by = "" if flown == ticks else self._ended_by()
-        end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
+        ended_by, end = "", End(Ending.OVER)
+        if flown != ticks:
+            cause = self.transmitter.end
+            ended_by = end_text(cause, "receiver") if cause else guard_text(self.node.guard.reason)
+            end = cause or End(Ending.SAFETY_STOP)
         self.loop.finish(lambda: end)
         self.receiver.flush_records()
         rows = (self.transmitter_rows, self.receiver_rows)
         return result_of(
             self.codec.model, self.terms, self.transmitter, self.receiver, rows, flown, ended_by
         )
-
-    def _ended_by(self) -> str:
-        """Return why a flight ended early, for people."""
-        end = self.transmitter.end
-        return guard_text(self.node.guard.reason) if end is None else end_text(end, "receiver")
 
 
 def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import signal
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import StrEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
 from channel.protocol.endings import End, Ending
 from tenbaud.files.whole import WriteError
-from tenbaud.flight.verdict import NotFlown
 from tenbaud.sentences import endings
+from tenbaud.sentences.exit_codes import ExitCode as ExitCode
 
 
-class ExitCode(IntEnum):
-    """Exit codes of every command."""
+class NotFlown(StrEnum):
+    """The faults of a flight."""
 
-    OK = 0
-    FAILED = 1
-    USAGE = 2
-    MISMATCH = 3
-    LINK_LOST = 4
-    DESYNC = 5
-    SAFETY_STOP = 6
-    NOT_FLOWN = 7
-    NOT_WRITTEN = 8
-    INTERRUPTED = 130
+    NEVER_LOCKED = "never locked"
+    REJOINING = "rejoins without end"
+    UNCONFIRMED = "too few samples confirmed"
+    CONTROLLER = "the controller failed"
+    FELL = "the plant fell"
+    GUARD_DOWN = "guard down"
+    NO_COMMANDS = "no commands in time"
+    NO_WORDS = "no words"
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from channel.errors import ConfigMismatch
 from channel.links.base import Link
@@ -13,7 +14,7 @@ from receiver.session.session import Phase, ReceiverSession
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
+from tenbaud.flight.verdict import FlightCounts, verdict
 from tenbaud.sentences import endings
 
 
@@ -48,11 +49,7 @@ def ended_outcome(agreement: Agreement, session: ReceiverSession) -> Outcome:
     text = endings.end_text(session.end, "transmitter")
     if ending not in (Ending.OVER, Ending.STOPPED):
         return Outcome(ExitCode.LINK_LOST, text)
-    return _not_flown(agreement, session) or Outcome(ExitCode.OK, text)
-
-
-def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None:
-    """Return the outcome of a session whose flight did not fly, as far as this end can see."""
+    # As far as this end can see.
     flown = session.counts["samples"]
     counts = FlightCounts(
         samples=flown + session.counts["samples_skipped"],
@@ -62,10 +59,8 @@ def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None
         bad_commands=session.counts["bad_commands"],
         commands=flown * agreement.terms.ticks_per_sample,
     )
-    faults = faults_of(counts)
-    if not faults:
-        return None
-    text = verdict_text(faults, counts, settings_of(agreement), {})
-    if session.controller_problem:
-        text += f"\n  its first fault: the controller {session.controller_problem}"
-    return Outcome(ExitCode.NOT_FLOWN, text, faults)
+    outcome = verdict(counts, agreement)
+    if outcome is not None and session.controller_problem:
+        why = f"its first fault: the controller {session.controller_problem}"
+        return replace(outcome, text=f"{outcome.text}\n  {why}")
+    return outcome or Outcome(ExitCode.OK, text)

@@ -15,12 +15,14 @@ from tenbaud.files.whole import WriteError, remove, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
-from tenbaud.sentences.flown import Summary
+from tenbaud.sentences.flown import Summary, figures_of, verdict_of, warnings_of
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from tenbaud.recording.envelope import Curve
+
+LABEL_WIDTH = 16
 
 
 def write_up(
@@ -43,7 +45,8 @@ def write_up(
         problems.append(outcome_of(error))
     if draw:
         try:
-            draw_figure(folder, figure_title(config, summary), usual)
+            plant, rate_baud = summary.get("plant", ""), config.channel.rate_baud
+            draw_figure(folder, f"{config.preset}: {plant}, {rate_baud:g} bit/s", usual)
         except (RecordingError, WriteError) as error:
             code = ExitCode.NOT_WRITTEN if isinstance(error, WriteError) else ExitCode.OK
             problems.append(Outcome(code, f"no figure was drawn: {error}"))
@@ -91,15 +94,13 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
 
 def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> None:
     """Draw the figure of a run from its recordings. Raises RecordingError and WriteError."""
-    from tenbaud.recording.figure import draw_flight
+    from tenbaud.recording.figure import FLIGHT_DOTS_PER_INCH, draw_run
+    from tenbaud.recording.style import save
 
     receiver = folder.receiver if folder.receiver.is_file() else None
-    draw_flight(folder.transmitter, receiver, folder.figure, title, usual)
-
-
-def figure_title(config: FlightConfig, summary: Summary) -> str:
-    """Return the title of a flight's figure."""
-    return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
+    # Its recordings were made just now.
+    figure = draw_run(folder.transmitter, receiver, title, own=True, usual=usual)
+    save(figure, [folder.figure], FLIGHT_DOTS_PER_INCH)
 
 
 def show_summaries(
@@ -115,7 +116,6 @@ def show_summaries(
     """
     from rich.console import Console
 
-    from tenbaud.flight.closing import closing_lines
     from tenbaud.flight.narrow import for_terminal
     from tenbaud.flight.screen import unicode_fits
 
@@ -126,6 +126,30 @@ def show_summaries(
         lines = closing_lines(summary, folder, unicode=unicode_fits(console), then=then)
         text = for_terminal("\n".join(lines))
         console.print(text, soft_wrap=True, highlight=False, markup=False)
+
+
+def closing_lines(
+    summary: Summary, folder: RunFolder, *, unicode: bool = True, then: str | None = None
+) -> list[str]:
+    """Return the lines that end a flight on a terminal; angles are in degrees.
+
+    `then`: the next command after a flight that ended well; None: its replay.
+    """
+    lines = [verdict_of(summary, unicode)]
+    lines += [f"  {'! ' if not unicode else '⚠ '}{text}" for text in warnings_of(summary)]
+    shown = [*figures_of(summary, unicode), _what_next(summary, folder, then)]
+    return lines + [f"  {label:{LABEL_WIDTH}}{text}" for label, text in shown]
+
+
+def _what_next(summary: Summary, folder: RunFolder, then: str | None) -> tuple[str, str]:
+    """Return the file to open and the next command, as a label and its text."""
+    path = str(folder.path)
+    path = f'"{path}"' if " " in path else path
+    drawn = folder.figure.is_file()
+    label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)
+    failed = int(summary["exit_code"])
+    following = f"tenbaud inspect {path}" if failed else then or f"tenbaud replay {path}"
+    return label, f"{place}   Next: {following}"
 
 
 def _table(summaries: Sequence[Summary]) -> Table:

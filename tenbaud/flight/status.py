@@ -52,7 +52,7 @@ def status_line(status: Status) -> str:
         if status.get(name) is not None:
             words.append(f"{label} {form.format(status[name])}")
     if narrow := status.get("narrow"):
-        words += [f"{name} {narrow[name]}" for name in ("unconfirmed", "copies")]
+        words += [f"{name} {narrow[name]}" for name in ("unconfirmed", "hypotheses")]
         words.append(f"rest {narrow['rest']:.0e}")
         if narrow["baud"] is not None:
             words.append(f"down {narrow['baud']:.1f}/s")

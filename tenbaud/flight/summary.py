@@ -10,16 +10,19 @@ from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
 from channel.protocol.endings import End
 from receiver.endpoint import ReceiverEndpoint
+from receiver.session.session import ReceiverSession
 from tenbaud.build.flight import Agreement
 from tenbaud.build.recorded import replay_notes
 from tenbaud.build.rig import real_rig_name
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.flight.outcome import Outcome
+from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences import events
 from tenbaud.sentences.flown import Summary
 from transmitter.metrics.gap import Gap
 from transmitter.metrics.scores import ErrorMeter
 from transmitter.session.down_symbols import NarrowFollowing
+from transmitter.session.session import TransmitterSession
 
 
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
@@ -37,15 +40,10 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "wire_bytes_up": meter.wire_bytes,
         "coder_bits_down": run.endpoint.inlet.meter.coder_bits,
         "wire_bytes_down": run.wire_bytes_down,
-        "erasures": session.counts["erasures"],
-        "digest_checks": session.counts["digest_checks"],
-        "desyncs": session.counts["desyncs"],
-        "rejoins": session.counts["rejoins"],
+        **counted(session, "erasures", "digest_checks", "desyncs", "rejoins"),
         "rejoin_bytes": run.rejoin_bytes,
         "stale_commands": session.counts["stale_frames"],
-        COUNTER: session.counts[COUNTER],
-        "claims_refused": session.counts["claims_refused"],
-        "take_overs": session.counts["take_overs"],
+        **counted(session, COUNTER, "claims_refused", "take_overs"),
         "rejoins_asked": {why.name.lower(): n for why, n in session.rejoins_asked.items()},
         "guard_rearmed": node.rearmed,
         "ticks_guard_down": node.ticks_down,
@@ -65,7 +63,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         **gap_part(node.gauge.whole if node.gauge is not None else None),
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.refused,
-        "words_missed": session.counts["words_missed"],
+        **counted(session, "words_missed"),
         **_rate(run),
         "sensor_fault": events.guard_text(node.sensor_fault) or None,
         "loop_late_ms_p50": None,
@@ -74,6 +72,20 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
         **narrow_part(run),
         **run.extra,
+    }
+
+
+def counted(session: TransmitterSession | ReceiverSession, *names: str) -> Summary:
+    """Return some counts of a session."""
+    return {name: session.counts[name] for name in names}
+
+
+def recording_part(recorder: McapRecorder) -> Summary:
+    """Return how well the rows of an end were recorded."""
+    return {
+        "recording_rows": recorder.rows_written,
+        "recording_rows_lost": recorder.rows_dropped,
+        "recording_error": recorder.error,
     }
 
 
@@ -109,17 +121,17 @@ def _rate(run: TransmitterRun) -> Summary:
     """Return the symbol rate asked for, the one kept, and the share that is missing."""
     terms, counts = run.agreement.terms, run.node.session.counts
     asked = 1e9 * terms.symbols_per_word / terms.sample_ns
-    if not run.ticks:
-        return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
-    samples = run.ticks / terms.ticks_per_sample
-    if terms.is_narrow:
-        # Whether the last words were consumed was not certain yet.
-        samples = max(1, counts["confirmed"])
-    share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
+    share: float | None = None
+    if run.ticks:
+        samples = run.ticks / terms.ticks_per_sample
+        if terms.is_narrow:
+            # Whether the last words were consumed was not certain yet.
+            samples = max(1, counts["confirmed"])
+        share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
     return {
         "symbols_per_s_asked": asked,
-        "symbols_per_s_kept": share * asked,
-        "symbols_missing_share": 1.0 - share,
+        "symbols_per_s_kept": None if share is None else share * asked,
+        "symbols_missing_share": None if share is None else 1.0 - share,
     }
 
 
@@ -144,15 +156,10 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "wire_bytes_up": endpoint.inlet.meter.wire_bytes,
         "coder_bits_down": endpoint.downlink.meter.coder_bits,
         "wire_bytes_down": endpoint.downlink.meter.wire_bytes,
-        "erasures": session.counts["erasures"],
-        "symbols_late": session.counts["symbols_late"],
-        "symbols_misplaced": session.counts["symbols_misplaced"],
-        "stale_frames": session.counts["stale_frames"],
-        COUNTER: session.counts[COUNTER],
-        "bad_commands": session.counts["bad_commands"],
+        **counted(session, "erasures", "symbols_late", "symbols_misplaced", "stale_frames"),
+        **counted(session, COUNTER, "bad_commands"),
         "malformed": endpoint.inlet.malformed,
-        "desyncs": session.counts["desyncs"],
-        "rejoins": session.counts["rejoins"],
+        **counted(session, "desyncs", "rejoins"),
         "impaired_down": dict(endpoint.downlink.line.counts),
     }
 
@@ -259,12 +266,14 @@ def _learned(run: TransmitterRun) -> Summary:
 
 
 def _errors(name: str, meter: ErrorMeter, angle_max: float, reference_max: float) -> Summary:
-    rms = meter.rms
-    some = meter.count > 0
+    def share(value: float | None, whole: float) -> float | None:
+        return value / whole if value is not None and whole else None
+
+    most, rms = meter.largest if meter.count else None, meter.rms
     return {
-        f"{name}_max_rad": meter.largest if some else None,
+        f"{name}_max_rad": most,
         f"{name}_rms_rad": rms,
-        f"{name}_max_fraction": meter.largest / angle_max if some and angle_max else None,
-        f"{name}_rms_fraction": rms / angle_max if rms is not None and angle_max else None,
-        f"{name}_max_of_reference": meter.largest / reference_max if some and reference_max else None,
+        f"{name}_max_fraction": share(most, angle_max),
+        f"{name}_rms_fraction": share(rms, angle_max),
+        f"{name}_max_of_reference": share(most, reference_max),
     }

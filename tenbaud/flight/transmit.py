@@ -7,17 +7,17 @@ from collections.abc import Callable
 
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.clocks import SkewedClock, SkewedPeer
-from channel.line.line import CleanLine
+from channel.line.line import CleanLine, Uplink
 from channel.line.virtual import Peer
 from channel.links.base import Link
 from channel.protocol.endings import End, Ending
 from channel.protocol.recording import Recorder
 from channel.protocol.wire import Wire
-from tenbaud.build.ends import build_line, build_transmitter, build_uplink
+from tenbaud.build.ends import build_line, build_transmitter
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, farewell_of
-from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
+from tenbaud.flight.verdict import FlightCounts, verdict
 from tenbaud.log.units import turn_in
 from tenbaud.sentences import endings, events
 from transmitter.endpoint import TransmitterEndpoint
@@ -35,10 +35,11 @@ UPRIGHT = ("pendulum", "rotary pendulum")
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
-    endpoint = TransmitterEndpoint(node, build_uplink(agreement, wire, recorder))
+    line, alphabet = build_line(agreement, "up", wire), agreement.codec.coder.alphabet
+    uplink = Uplink(agreement.terms, alphabet, line, wire, recorder)
     virtual = agreement.clock == "virtual"
     downlink = build_line(agreement, "down", wire) if virtual else CleanLine()
-    return TransmitterRun(agreement, endpoint, downlink)
+    return TransmitterRun(agreement, TransmitterEndpoint(node, uplink), downlink)
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
@@ -71,71 +72,56 @@ def _fly(
     should_stop: Stop,
     peer_present: Callable[[], bool] = lambda: True,
 ) -> Outcome:
-    inlet, rig = run.endpoint.inlet, run.node.rig
+    inlet, rig, session = run.endpoint.inlet, run.node.rig, run.node.session
     with rig:
         flight.greet()
         if should_stop():
             # A session may have begun meanwhile, whose receiver would wait for the flight.
             flight.leave(End(Ending.STOPPED))
             return Outcome(ExitCode.INTERRUPTED, endings.ending_text(Ending.STOPPED))
-        _check_welcome(run)
+        if session.refusal is not None:
+            raise ConfigMismatch(f"the receiver refused: {endings.refusal_text(session.refusal)}")
+        if session.phase is Phase.GREETING:
+            raise LinkLost("no answer to any request for a session came through this line")
         greeting_bytes = _control_bytes(run)
         started = time.perf_counter()
-        first = run.node.session.epoch_tick
+        first = session.epoch_tick
         try:
             run.ticks = flight.run(run.agreement.flight_ticks) - first
             run.rejoin_bytes = _control_bytes(run) - greeting_bytes
             present = peer_present()
-            ending = _Ending(run, _outcome(run, present), present)
-            flight.finish(ending.farewell)
+            outcome = _outcome(run, present)
+
+            def farewell() -> End:
+                """Settle the outcome, now that the last echoes are in: only a difference counts."""
+                nonlocal outcome
+                if outcome.code is ExitCode.OK:
+                    outcome = _desync_outcome(run) or outcome
+                # Where the other end is gone, that is the cause of everything that the counts show.
+                if outcome.code is ExitCode.OK or (present and _went_to_its_end(run)):
+                    outcome = _not_flown(run) or outcome
+                return farewell_of(outcome)
+
+            flight.finish(farewell)
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = inlet.meter.wire_bytes
             run.extra["malformed"] = inlet.malformed
             if figures := rig.figures():
                 run.extra["rig"] = figures
-    return ending.outcome
-
-
-def _check_welcome(run: TransmitterRun) -> None:
-    session = run.node.session
-    if session.refusal is not None:
-        raise ConfigMismatch(f"the receiver refused: {endings.refusal_text(session.refusal)}")
-    if session.phase is Phase.GREETING:
-        raise LinkLost("no answer to any request for a session came through this line")
+    return outcome
 
 
 def _control_bytes(run: TransmitterRun) -> int:
     return run.uplink.meter.control_bytes + run.endpoint.inlet.meter.control_bytes
 
 
-class _Ending:
-    """The outcome of a flight: as it was after the last tick, then with what the last echoes tell.
-
-    Of these, only that the copies differ counts: a flight that was flown to its end is over.
-    """
-
-    def __init__(self, run: TransmitterRun, outcome: Outcome, peer_present: bool) -> None:
-        self.outcome = outcome
-        self._run = run
-        self._peer_present = peer_present
-
-    def farewell(self) -> End:
-        """Settle the outcome, now that the last echoes are in; return the ending for the receiver."""
-        if self.outcome.code is ExitCode.OK:
-            self.outcome = _desync_outcome(self._run) or self.outcome
-        # Where the other end is gone, that is the cause of everything that the counts show.
-        if self.outcome.code is ExitCode.OK or (self._peer_present and self._went_to_its_end):
-            self.outcome = _not_flown(self._run) or self.outcome
-        return farewell_of(self.outcome)
-
-    @property
-    def _went_to_its_end(self) -> bool:
-        """Return whether the flight ended only because its time was over, in any state."""
-        run, session, guard = self._run, self._run.node.session, self._run.node.guard
-        harmless = not guard.stopped or guard.timed_out
-        flown = run.ticks >= run.agreement.flight_ticks
-        return flown and harmless and session.desync is None and session.phase is not Phase.ENDED
+def _went_to_its_end(run: TransmitterRun) -> bool:
+    """Return whether a flight ended only because its time was over, in any state."""
+    session, guard = run.node.session, run.node.guard
+    harmless = not guard.stopped or guard.timed_out
+    flown = run.ticks >= run.agreement.flight_ticks
+    return flown and harmless and session.desync is None and session.phase is not Phase.ENDED
 
 
 def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
@@ -165,13 +151,8 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
 
 def _not_flown(run: TransmitterRun) -> Outcome | None:
     """Return the outcome of a flight that went to its end without flying; None: it has flown."""
-    counts = flight_counts(run)
-    faults = faults_of(counts)
-    if not faults:
-        return None
     asked = {why.name.lower(): number for why, number in run.node.session.rejoins_asked.items()}
-    text = verdict_text(faults, counts, settings_of(run.agreement), asked)
-    return Outcome(ExitCode.NOT_FLOWN, text, faults)
+    return verdict(flight_counts(run), run.agreement, asked)
 
 
 LATEST_CERTAIN_SAMPLES = 64

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tenbaud.build.flight import Agreement
+from tenbaud.build.flight import Agreement
+from tenbaud.flight.outcome import ExitCode, NotFlown, Outcome
 
 CONFIRMED_SHARE_MIN = 0.5
 """of the samples that the flight had time for"""
@@ -28,19 +26,6 @@ BAD_COMMANDS_SHARE_MAX = 0.01
 REJOINS_MIN = 10
 EPOCH_SAMPLES_MIN = 20
 """This many rejoins, with fewer confirmed samples than this for each, are rejoins without end."""
-
-
-class NotFlown(StrEnum):
-    """The faults of a flight."""
-
-    NEVER_LOCKED = "never locked"
-    REJOINING = "rejoins without end"
-    UNCONFIRMED = "too few samples confirmed"
-    CONTROLLER = "the controller failed"
-    FELL = "the plant fell"
-    GUARD_DOWN = "guard down"
-    NO_COMMANDS = "no commands in time"
-    NO_WORDS = "no words"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,49 +66,23 @@ def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
     return tuple(fault for fault, applies in holds.items() if applies)
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """The settings that a person could change."""
-
-    lead_s: float
-    watchdog_s: float
-    round_trip_s: float
-    """as far as the configuration knows"""
-    deadline_allowance_s: float
-    uplink_spread_s: float
-    repeats: int
-    is_narrow: bool = False
-    is_mirrored: bool = False
-
-
-def settings_of(agreement: Agreement) -> Settings:
-    """Return the possible changes to a flight."""
-    # Imported here: every command imports this module for its exit codes.
-    from tenbaud.build.flight import watchdog_wanted_s
-    from tenbaud.build.liveness import watchdog_ticks
-
-    terms, up = agreement.terms, agreement.faults.up
-    tick_s = terms.tick_ns / 1e9
-    watchdog = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)
-    return Settings(
-        lead_s=terms.lead_ticks * tick_s,
-        watchdog_s=watchdog * tick_s,
-        round_trip_s=agreement.trip.longest_ticks * tick_s,
-        deadline_allowance_s=terms.deadline_allowance_ns / 1e9,
-        uplink_spread_s=2 * up.jitter_ns / 1e9,
-        repeats=terms.repeats,
-        is_narrow=terms.is_narrow,
-        is_mirrored=terms.is_mirrored,
-    )
-
-
-def verdict_text(
-    faults: tuple[NotFlown, ...], counts: FlightCounts, settings: Settings, asked: Mapping[str, int]
-) -> str:
-    """Return the verdict with its numbers and a remedy, for people.
+def verdict(
+    counts: FlightCounts, agreement: Agreement, asked: Mapping[str, int] | None = None
+) -> Outcome | None:
+    """Return the outcome of a flight that went to its end without flying; None: it has flown.
 
     `asked`: how often a new epoch was asked for, by reason.
     """
+    faults = faults_of(counts)
+    if not faults:
+        return None
+    return Outcome(ExitCode.NOT_FLOWN, verdict_text(faults, counts, agreement, asked or {}), faults)
+
+
+def verdict_text(
+    faults: tuple[NotFlown, ...], counts: FlightCounts, agreement: Agreement, asked: Mapping[str, int]
+) -> str:
+    """Return the verdict with its numbers and a remedy, for people."""
     numbers = [f"{counts.confirmed} of {counts.samples} samples confirmed"]
     numbers.append(f"{counts.erased} of these erased")
     if counts.ticks:
@@ -137,20 +96,22 @@ def verdict_text(
     numbers.append(f"{counts.rejoins} rejoins" + (f" (asked for: {reasons})" if reasons else ""))
     lines = [f"the flight did not fly ({', '.join(faults)}): " + ", ".join(numbers)]
     # One fault causes others: the remedy is that of the first fault that has one.
-    lines += [ADVICE[fault](settings) for fault in faults if fault in ADVICE][:1]
+    lines += [ADVICE[fault](agreement) for fault in faults if fault in ADVICE][:1]
     return "\n  ".join(lines)
 
 
-def _on_words(one: Settings) -> str:
-    if one.uplink_spread_s > one.deadline_allowance_s:
+def _on_words(flight: Agreement) -> str:
+    allowance_s = flight.terms.deadline_allowance_ns / 1e9
+    spread_s = 2 * flight.faults.up.jitter_ns / 1e9
+    if spread_s > allowance_s:
         return (
-            f"symbols spread by {one.uplink_spread_s:g} s on this line, and one that is more than "
-            f"channel.deadline_allowance_s = {one.deadline_allowance_s:g} late is erased: set it to at "
-            f'least {one.uplink_spread_s:g} at both ends, and leave timing.lead_ticks at "auto"'
+            f"symbols spread by {spread_s:g} s on this line, and one that is more than "
+            f"channel.deadline_allowance_s = {allowance_s:g} late is erased: set it to at "
+            f'least {spread_s:g} at both ends, and leave timing.lead_ticks at "auto"'
         )
     return (
         "nearly all symbols are lost, or later than channel.deadline_allowance_s = "
-        f"{one.deadline_allowance_s:g} allows: look at the uplink, or raise it at both ends"
+        f"{allowance_s:g} allows: look at the uplink, or raise it at both ends"
     )
 
 
@@ -161,43 +122,45 @@ DOWN_SYMBOLS = (
 )
 
 
-def _on_commands(one: Settings) -> str:
-    if one.is_mirrored:
+def _on_commands(flight: Agreement) -> str:
+    if flight.terms.is_mirrored:
         return DOWN_SYMBOLS  # its commands wait for no line: they stop when nothing is confirmed
+    tick_s = flight.terms.tick_ns / 1e9
     return (
-        f"the command lead is {one.lead_s:g} s, the watchdog {one.watchdog_s:g} s, and the "
-        f"configuration knows of a round trip of {one.round_trip_s:g} s; if the line takes longer, "
+        f"the command lead is {flight.terms.lead_ticks * tick_s:g} s, the watchdog "
+        f"{flight.watchdog_ticks * tick_s:g} s, and the configuration knows of a round trip of "
+        f"{flight.trip.longest_ticks * tick_s:g} s; if the line takes longer, "
         "raise timing.lead_ticks (--lead) at both ends to what it takes, and leave "
         'transmitter.watchdog_s at "auto"'
     )
 
 
-def _on_rejoins(one: Settings) -> str:
-    if one.is_mirrored:
+def _on_rejoins(flight: Agreement) -> str:
+    if flight.terms.is_mirrored:
         return DOWN_SYMBOLS
-    if one.is_narrow:
-        return f"{DOWN_SYMBOLS}; {_on_commands(one)}"
+    if flight.terms.is_narrow:
+        return f"{DOWN_SYMBOLS}; {_on_commands(flight)}"
     return (
-        f"each command frame repeats channel.repeats = {one.repeats} samples: raise it at both ends if "
-        "command frames are lost; " + _on_commands(one)
+        f"each command frame repeats channel.repeats = {flight.terms.repeats} samples: raise it at "
+        "both ends if command frames are lost; " + _on_commands(flight)
     )
 
 
-def _on_controller(_: Settings) -> str:
+def _on_controller(_: Agreement) -> str:
     return (
         "the last command was held at these ticks: a command is a tuple with one finite number for "
         "each input, and an exception counts as none"
     )
 
 
-def _on_fall(_: Settings) -> str:
+def _on_fall(_: Agreement) -> str:
     return (
         "the pendulum went beyond 90 degrees from upright: raise the rate (channel.rate_baud) at both "
         "ends; `tenbaud floor` tells how much the plant needs"
     )
 
 
-ADVICE: Mapping[NotFlown, Callable[[Settings], str]] = {
+ADVICE: Mapping[NotFlown, Callable[[Agreement], str]] = {
     NotFlown.CONTROLLER: _on_controller,
     NotFlown.FELL: _on_fall,
     NotFlown.NO_WORDS: _on_words,

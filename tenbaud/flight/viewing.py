@@ -8,13 +8,14 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO
 
 from channel.errors import LinkLost
 from channel.links.base import Role
+from channel.links.endpoints import loopback_host
 from tenbaud.flight.lifeline import end_child, start_child
 from tenbaud.telemetry.end import TelemetryOptions
 from tenbaud.telemetry.place import SOCKET
@@ -34,54 +35,58 @@ class ViewOptions:
     port: int
     open_browser: bool = False
 
+    @classmethod
+    def checked(cls, port: int, open_browser: bool) -> ViewOptions:
+        """Return the options of a page that can be served, on any free port for 0."""
+        from tenbaud.view.server import Address, require_nicegui
 
-@dataclass(frozen=True, slots=True)
-class Viewing:
-    """Where the page receives the telemetry of both ends, and how fast they fly."""
-
-    endpoints: Mapping[Role, str] = field(default_factory=dict)
-    """nothing: there is no page"""
-    pace: float | None = None
-    """virtual seconds per second at most"""
-
-    def words(self, role: Role) -> list[str]:
-        """Return the options of a process that flies one end."""
-        words = ["--telemetry", self.endpoints[role], "--allow-control"] if self.endpoints else []
-        if self.pace is not None and role == "transmitter":
-            words += ["--pace", str(self.pace)]
-        return words
-
-    def options(self, role: Role) -> TelemetryOptions:
-        """Return the same for an end in this process."""
-        endpoint = self.endpoints.get(role, "off")
-        return TelemetryOptions(endpoint, control=bool(self.endpoints), pace=self.pace)
+        require_nicegui()
+        return cls(Address(loopback_host(), port).checked().port, open_browser)
 
 
-ALONE = Viewing()
-"""There is no viewer."""
+Views = Mapping[Role, TelemetryOptions]
+"""The telemetry of both ends for a viewer, and how fast they fly."""
+
+
+def viewed(places: Mapping[Role, str] | None = None, pace: float | None = None) -> Views:
+    """Return the telemetry of a flight with a page that receives it at these places, or without one."""
+    telemetry = {role: "off" if places is None else places[role] for role in ENDS}
+    return {
+        role: TelemetryOptions(one, control=places is not None, pace=pace)
+        for role, one in telemetry.items()
+    }
+
+
+def words_of(role: Role, options: TelemetryOptions) -> list[str]:
+    """Return the same as options of a process that flies one end."""
+    words = ["--telemetry", options.endpoint, "--allow-control"] if options.control else []
+    if options.pace is not None and role == "transmitter":
+        words += ["--pace", str(options.pace)]
+    return words
 
 
 @contextmanager
 def page_beside(
     options: ViewOptions | None, should_stop: Callable[[], bool], pace: float | None = None
-) -> Iterator[Viewing]:
+) -> Iterator[Views]:
     """Within the `with`, the page is served; yields what both ends have to know.
 
     Raises LinkLost when it cannot be served, and KeyboardInterrupt when it is asked to stop meanwhile.
     """
     if options is None:
-        yield Viewing(pace=pace)
+        yield viewed(pace=pace)
         return
     with TemporaryDirectory(prefix="tenbaud-view-") as folder:
         places = {role: f"{SOCKET}{Path(folder) / role}.sock" for role in ENDS}
         process = _start(places.values(), options)
         try:
             _wait_until_served(process, should_stop)
-            yield Viewing(places, pace)
+            yield viewed(places, pace)
             if process.poll() is None:
                 time.sleep(LAST_WORD_S)
             else:
-                how = _how_ended(process)
+                code = process.returncode
+                how = f"exit code {code}" if code >= 0 else f"signal {-code}"
                 sys.stderr.write(f"tenbaud: the live page ended before the flight, by {how}\n")
         finally:
             end_child(process, ENDING_TIMEOUT_S)
@@ -104,11 +109,6 @@ def _wait_until_served(process: subprocess.Popen[str], should_stop: Callable[[],
             raise KeyboardInterrupt
         if process.poll() is not None or time.monotonic() > until_s:
             raise LinkLost("the live page could not be served; the lines above say why")
-
-
-def _how_ended(process: subprocess.Popen[str]) -> str:
-    code = process.returncode
-    return f"exit code {code}" if code >= 0 else f"signal {-code}"
 
 
 def _pass_on(stream: IO[str], serving: threading.Event) -> None:

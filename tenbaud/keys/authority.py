@@ -47,9 +47,9 @@ class Certified:
     begins: datetime
     expires: datetime
 
-    def days_left(self, now: datetime | None = None) -> float:
+    def days_left(self) -> float:
         """Return the days until it expires; negative afterwards."""
-        return (self.expires - (now or datetime.now(UTC))).total_seconds() / 86_400.0
+        return (self.expires - datetime.now(UTC)).total_seconds() / 86_400.0
 
 
 @dataclass(frozen=True, slots=True)

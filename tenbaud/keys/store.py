@@ -145,7 +145,7 @@ def read_node(folder: Path) -> NodeKeys:
     return NodeKeys(folder, certified)
 
 
-def usable(folder: Path, role: NodeRole | None) -> NodeKeys:
+def usable(folder: Path, role: NodeRole) -> NodeKeys:
     """Read a node's folder for use now, in this role; KeysError when expired or for another role."""
     node = read_node(folder)
     certified = node.certified
@@ -155,7 +155,7 @@ def usable(folder: Path, role: NodeRole | None) -> NodeKeys:
         raise KeysError(
             f"{folder.resolve()} is no text in UTF-8, and Zenoh takes no other name; move the keys"
         ) from error
-    if role is not None and certified.role is not role:
+    if certified.role is not role:
         raise KeysError(
             f"{folder} is the certificate of a {certified.role}, and this is a {role}; make one with "
             f"`tenbaud keys add NAME --role {role}`"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from tenbaud.sentences.exit_codes import ExitCode
 from tenbaud.sentences.quantities import in_degrees
 
 Summary = dict[str, Any]
@@ -13,14 +14,12 @@ LATE_SHARE_WORTH_A_WARNING = 0.01
 LIMITED_SHARE_WORTH_A_WARNING = 0.5
 LOST_ERROR_SHARE = 0.5
 """of the largest output: with an rms error beyond it the estimate says little about the plant"""
-INTERRUPTED = 130
-"""The exit code of a flight that a person or a signal ended."""
 
 
 def verdict_of(summary: Summary, unicode: bool = True) -> str:
     """Return how a flight ended, in one line."""
     code = int(summary["exit_code"])
-    if code and code != INTERRUPTED:
+    if code and code != ExitCode.INTERRUPTED:
         mark = "✗" if unicode else "x"
         cause = ", ".join(summary.get("not_flown") or ()) or summary["outcome"]
         return f"{mark} Flight failed (exit code {code}): {cause}"

@@ -11,8 +11,7 @@ from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
-from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
-from tenbaud.flight.verdict import NotFlown
+from tenbaud.flight.outcome import ExitCode, NotFlown, Outcome, outcome_of
 from tenbaud.studies.figures import FlightFigures, OutputFigures
 from transmitter.metrics.scores import ErrorMeter
 

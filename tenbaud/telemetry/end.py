@@ -11,6 +11,7 @@ from typing import Any
 
 from channel.errors import LinkError
 from channel.links.base import Role
+from channel.links.kind import NodePlace
 from channel.links.security import Security
 from channel.protocol.recording import Recorder
 from receiver.controllers.references import SteeredReference
@@ -53,9 +54,9 @@ FREE = (-math.inf, math.inf)
 class TelemetryEnd:
     """The telemetry of one end, from before its parts are built until after its flight.
 
-    `addresses`, `insecure` and `security` are those of the flight's link; the viewers invited there may
-    see the telemetry, and steer where the flight allows it. An error only disables the telemetry,
-    unless it was asked for: LinkError for an endpoint that cannot be used.
+    `node` is that of the flight's link; the viewers invited there may see the telemetry, and steer
+    where the flight allows it. An error only disables the telemetry, unless it was asked for: LinkError
+    for an endpoint that cannot be used.
     """
 
     def __init__(
@@ -64,9 +65,7 @@ class TelemetryEnd:
         role: Role,
         recorder: Recorder,
         options: TelemetryOptions,
-        addresses: tuple[str, ...] = (),
-        insecure: bool = False,
-        security: Security | None = None,
+        node: NodePlace,
     ) -> None:
         self.agreement = agreement
         self.role: Role = role
@@ -74,6 +73,8 @@ class TelemetryEnd:
         self.publisher: Publisher | None = None
         self.requested = bool(options.endpoint)
         """whether this telemetry was asked for, so that a flight without it is refused"""
+        security, insecure = node.get("security"), node.get("insecure", False)
+        addresses = node.get("listen", ()) + node.get("connect", ()) + node.get("router", ())
         with self._optional():
             secured = security is not None
             self.endpoint = endpoint_for(options.endpoint, role, addresses, insecure, secured)
@@ -92,7 +93,7 @@ class TelemetryEnd:
         self.security = None if security is None else _for_viewers(security, agreement.live)
 
     def fly_transmitter(
-        self, run: TransmitterRun, stop: Stop, keep_alive: Callable[[], None] | None = None
+        self, run: TransmitterRun, stop: Stop, keep_alive: Callable[[], object] | None = None
     ) -> LiveTransmitter:
         """Return what obeys commands for this transmitter, hung into its loop where it has work."""
         live = LiveTransmitter(run, self.queue, stop, self.pace, keep_alive or (lambda: None))
@@ -123,7 +124,7 @@ class TelemetryEnd:
         told = {
             "telemetry": self.publisher.error or "on",
             "telemetry_sent": self.publisher.sent,
-            "telemetry_dropped": self.publisher.skipped,
+            "telemetry_dropped": self.publisher.composer.skipped,
             "telemetry_rows_dropped": self.tap.dropped,
         }
         if self.queue is not None:
@@ -158,7 +159,7 @@ def steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
     references = build_references(agreement.config, agreement.signals, agreement.codec.model)
-    stops: dict[str, tuple[float, float]] = getattr(agreement.config.model, "stops", {})
+    stops = agreement.config.model.stops
     words = said_by_words(agreement.two_way)
     found: list[SteeredReference | None] = []
     for place, (output, one) in enumerate(zip(agreement.signals.outputs, references, strict=True)):

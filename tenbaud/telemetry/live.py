@@ -47,7 +47,7 @@ class LiveTransmitter:
         queue: CommandQueue | None,
         should_stop: Stop,
         pace: float | None = None,
-        keep_alive: Callable[[], None] = lambda: None,
+        keep_alive: Callable[[], object] = lambda: None,
     ) -> None:
         self.queue = queue
         self.pace = pace

@@ -123,7 +123,7 @@ class Confirmation(_Message):
 
     sample: int = Field(description="the last one whose down symbols came or were given up")
     confirmed_to: int = Field(description="the first sample that is not certain")
-    size: int = Field(description="copies of the state that are followed")
+    size: int = Field(description="hypotheses, copies of the state, that are followed")
     rest: float = Field(description="weight of what is not followed, in units of theirs")
     hash_symbols: int | None = Field(
         description="hash bits that came, of confirmed samples; a difference of the states stays "

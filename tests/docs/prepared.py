@@ -75,7 +75,8 @@ def serve_page(folder: Path, environment: dict[str, str], programs: Path) -> soc
         streams = [nothing.fileno(), 2, listener.fileno()]
         socket.send_fds(connection, [json.dumps(request).encode()], streams)
     for name in ("tenbaud", "python", "python3"):
-        (programs / name).write_text(
+        program = programs / name
+        program.write_text(
             PROGRAM.format(
                 python=sys.executable,
                 is_python=name != "tenbaud",
@@ -83,6 +84,7 @@ def serve_page(folder: Path, environment: dict[str, str], programs: Path) -> soc
                 server=server,
             )
         )
+        program.chmod(0o755)
     return connection
 
 

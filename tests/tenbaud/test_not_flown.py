@@ -15,9 +15,8 @@ from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
-from tenbaud.flight.outcome import ExitCode, Outcome
+from tenbaud.flight.outcome import ExitCode, NotFlown, Outcome
 from tenbaud.flight.receive import ended_outcome
-from tenbaud.flight.verdict import NotFlown
 from tests.tenbaud.processes import run
 
 NO_WORDS = "up:loss=0.95"

@@ -250,6 +250,15 @@ def test_when_the_lead_leaves_no_time_for_the_line_then_it_is_refused() -> None:
         agree(load_config(None, None, short), "real")
 
 
+@pytest.mark.parametrize(("clock", "byte_ns"), [("virtual", 0), ("real", 10**10 // 2400 + 1)])
+def test_when_the_clock_is_virtual_then_the_welcome_takes_no_time_on_a_slow_line(
+    clock: Any, byte_ns: int
+) -> None:
+    slow = {**settings(line_rate_baud=2400), "channel": {"downlink": "narrow"}}
+    # The first symbol is expected from the end of the welcome on.
+    assert agree(load_config(None, None, slow), clock).terms.downlink_byte_ns == byte_ns
+
+
 @pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
 def test_when_the_demo_flies_over_a_serial_line_then_it_is_the_flight_of_any_link(
     clock: str, tmp_path: Path

@@ -22,7 +22,7 @@ class Flight(ABC):
 
     def greet(self) -> None:
         """Ask for a session until there is one, a refusal, or no sense in going on."""
-        while self.endpoint.greeting and self._may_ask():
+        while self._needs_answer() and self._may_ask():
             self._send(self.endpoint.hello(self._now_ns()))
             self._await_answer()
 
@@ -70,6 +70,10 @@ class Flight(ABC):
         """End the session on both sides at once; before the first tick nothing else is to be done."""
         for message in self.endpoint.farewell(end):
             self._send_past_line(message)
+
+    def _needs_answer(self) -> bool:
+        """Return whether there is no answer to begin on."""
+        return self.endpoint.greeting
 
     @abstractmethod
     def _begin(self) -> None:

@@ -84,6 +84,7 @@ class RealFlight(Flight):
         self._hello = (0, b"")
         """when the last request left, and its message"""
         self._welcome = b""
+        self._is_answered = self._has_begun = False
         self._old_answers = 0
         self._peer_told = True
         """presence of the receiver as last reported"""
@@ -108,14 +109,19 @@ class RealFlight(Flight):
 
     def _await_answer(self) -> None:
         until_ns = self._now_ns() + self._ask_again_ns
-        while self.endpoint.greeting and (left_ns := until_ns - self._now_ns()) > 0:
+        self._is_answered = False
+        while not self._is_answered and (left_ns := until_ns - self._now_ns()) > 0:
             self._take_in(left_ns / 1e9)
         self._send_due()
-        session = self.endpoint.node.session
-        too_old = session.phase is Phase.FLYING and self._now_ns() > self._latest_start_ns
-        if too_old and self._old_answers < OLD_ANSWERS_MAX:
-            self._old_answers += 1
-            session.ask_again()
+
+    def _needs_answer(self) -> bool:
+        """Return whether there is no answer, or one so old that the receiver expects symbols by now."""
+        if self.endpoint.greeting:
+            return True
+        flying = self.endpoint.node.session.phase is Phase.FLYING
+        too_old = flying and (not self._is_answered or self._now_ns() > self._latest_start_ns)
+        self._old_answers += too_old
+        return too_old and self._old_answers <= OLD_ANSWERS_MAX
 
     @property
     def _latest_start_ns(self) -> int:
@@ -131,6 +137,7 @@ class RealFlight(Flight):
     def _begin(self) -> None:
         # A process that is held up here misses its first ticks: the receiver counts from its answer.
         begins_ns = min(self._now_ns() + LEAD_IN_NS, self._latest_start_ns)
+        self._has_begun = True
         self._start_ns += begins_ns - self.endpoint.tick * self._tick_ns
 
     def _rest(self) -> None:
@@ -205,6 +212,8 @@ class RealFlight(Flight):
         if self.endpoint.greeting:
             self._welcome = data
         self._outbox.put(self.endpoint.take(data, self._now_ns()))
+        # Another answer to the same request is the same message.
+        self._is_answered = not self.endpoint.greeting and data == self._welcome
         return True
 
     def _send(self, messages: list[Delivery]) -> None:
@@ -213,9 +222,12 @@ class RealFlight(Flight):
 
     def _send_due(self) -> None:
         for message in self._outbox.take(self._now_ns()):
+            if self._has_begun:
+                self._link.send(message)
+                continue
             leaves_ns, before = self._now_ns(), self._link.counts.messages_out
             self._link.send(message)
-            if self.endpoint.greeting and self._link.counts.messages_out > before:
+            if self._link.counts.messages_out > before:
                 self._hello = leaves_ns, message
 
     def _send_past_line(self, message: bytes) -> None:

@@ -132,10 +132,6 @@ class TransmitterSession:
         """Return the frame that requests a session; to be repeated until there is one."""
         return self._asking.hello(self.session_number, self.epoch, self._tick)
 
-    def ask_again(self) -> None:
-        """Want another answer before the first tick: the one that came is too old to begin on."""
-        self.phase = Phase.GREETING
-
     def on_measurement(self, tick: int, measurement: Vector) -> list[Frame]:
         """Take the measurement of a tick; return the frames that leave with it.
 

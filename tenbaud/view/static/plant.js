@@ -83,7 +83,7 @@ function build(flight, several, flights) {
   flight.at("outputs").replaceChildren(...(picture && !several ? [] : plant.outputs.flatMap((one) => gauge(one, ["reference", "estimate", "body"]))));
   flight.at("inputs").replaceChildren(...own.inputs.flatMap((one) => gauge(one, ["bar"])));
   flight.at("bit-keys").replaceChildren(...(several ? plant.outputs.flatMap((one, place) => [key(place), make("span")])
-    : [make("i", "key plus-key"), "up ", make("i", "key minus-key"), "down"]));
+    : [make("i", "key plus-key"), "sign + ", make("i", "key minus-key"), "sign −"]));
   flight.at("value-name").textContent = several ? "value" : plant.outputs[0] ? words(plant.outputs[0]) : "";
 }
 

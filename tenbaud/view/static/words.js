@@ -66,7 +66,7 @@ function showFigures(flight) {
     show("f-late", up.lateness ? `${up.lateness.p99_ms.toFixed(2)} ms` : up.clock === "virtual" ? "none: virtual clock" : "–");
     show("f-guard", up.guard || "–");
     show("f-rejoins", `${up.counts.desyncs}, ${up.counts.rejoins}`);
-    show("tape-text", `one every ${trimmed(up.symbol_period_s, 3)} s of flight, as the receiver consumes them`);
+    show("tape-text", `of the uplink, one every ${trimmed(up.symbol_period_s, 3)} s of flight, as the receiver consumes them`);
     flight.at("gap-box").hidden = up.gap_to_floor === undefined || up.gap_to_floor === null;
     if (!flight.at("gap-box").hidden) show("f-gap", `${up.gap_to_floor.toFixed(2)} ×`);
     showNarrow(flight, up.narrow);

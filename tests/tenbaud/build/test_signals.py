@@ -73,7 +73,7 @@ def test_limits_are_one_for_all_or_one_for_each_or_the_ranges() -> None:
 def test_soft_limits_are_given_by_name_too() -> None:
     assert soft_limits(own(transmitter__soft_limits={"tilt": 0.5}), CART) == (math.inf, 0.5)
     assert soft_limits(own(transmitter__soft_limits=0.5), CART) == (0.5, 0.5)
-    assert soft_limits(own(), CART) == ()
+    assert soft_limits(own(), CART) == (math.inf, math.inf)
 
 
 def test_an_encoder_counts_turns_of_an_angle_and_units_of_anything_else() -> None:

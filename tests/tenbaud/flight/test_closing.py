@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tenbaud.flight.closing import closing_lines
+from tenbaud.flight.report import closing_lines
 from tenbaud.recording.folder import RunFolder
 from tenbaud.sentences.flown import warnings_of
 

@@ -14,7 +14,7 @@ from tenbaud.config.load import load_config
 from tenbaud.flight import demo
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.viewing import Viewing
+from tenbaud.flight.viewing import viewed
 from tenbaud.recording.folder import RunFolder
 
 ENDS = {
@@ -41,7 +41,7 @@ def test_the_end_that_flew_is_left_to_end_its_flight(
     )
     agreement = agree(load_config("paper-10baud", None, {}), "virtual")
     with StopFlag() as stop:
-        result = demo._fly_processes(agreement, RunFolder(tmp_path), lambda _: None, Viewing(), stop)
+        result = demo._fly_processes(agreement, RunFolder(tmp_path), lambda _: None, viewed(), stop)
     assert result.code is ExitCode.NOT_FLOWN
     assert dismissed == ([] if samples else ["transmitter"])
     assert len(result.messages) == (2 if samples else 1)

@@ -58,19 +58,19 @@ def test_it_says_all_that_matters() -> None:
 
 def test_a_narrow_flight_says_what_is_certain_and_where_the_law_runs() -> None:
     narrow = {
-        "scheme": "mirrored", "confirmed_to": 391, "unconfirmed": 7, "copies": 3, "rest": 5.07e-7,
+        "scheme": "mirrored", "confirmed_to": 391, "unconfirmed": 7, "hypotheses": 3, "rest": 5.07e-7,
         "hash_bits_per_sample": 1.74, "baud": 19.98,
     }  # fmt: skip
     status = {**STATUS, "digest_checks": 0, "narrow": narrow}
     screen = Screen()
     screen.update(status)
     text = drawn(screen, color_system=None)
-    assert "certain before sample 391, 7 behind; 3 copies, rest 5e-07, 1 rejoins" in text
+    assert "certain before sample 391, 7 behind; 3 hypotheses, rest 5e-07, 1 rejoins" in text
     assert "unseen for n samples with probability 2^(-1.7 n)" in text
     assert "digests" not in text
     assert "19.98 symbols/s; the law runs beside the plant too" in text
     assert status_line(status).endswith(
-        "unconfirmed 7  copies 3  rest 5e-07  down 20.0/s  law beside the plant"
+        "unconfirmed 7  hypotheses 3  rest 5e-07  down 20.0/s  law beside the plant"
     )
 
 

@@ -6,19 +6,19 @@ from dataclasses import replace
 
 import pytest
 
-from tenbaud.flight.verdict import FlightCounts, NotFlown, Settings, faults_of, verdict_text
+from tenbaud.build.flight import Agreement, agree
+from tenbaud.config.load import load_config, nested
+from tenbaud.flight.outcome import NotFlown
+from tenbaud.flight.verdict import FlightCounts, faults_of, verdict_text
 
 GOOD = FlightCounts(
     samples=600, confirmed=600, erased=60, rejoins=2, ticks=6000, ticks_down=100, ticks_commanded=5900
 )
-SETTINGS = Settings(
-    lead_s=0.6,
-    watchdog_s=0.5,
-    round_trip_s=0.03,
-    deadline_allowance_s=0.02,
-    uplink_spread_s=0.0,
-    repeats=2,
-)
+
+
+def flight(**settings: object) -> Agreement:
+    lead = {"timing.lead_ticks": 60, "transmitter.watchdog_s": 0.5}
+    return agree(load_config(overrides=nested(lead | settings)), "real")
 
 
 def test_when_a_flight_has_flown_then_nothing_is_found() -> None:
@@ -59,17 +59,18 @@ def test_when_an_end_does_not_see_the_motors_then_it_does_not_judge_them() -> No
 
 @pytest.mark.parametrize("fault", [NotFlown.NO_COMMANDS, NotFlown.REJOINING, NotFlown.UNCONFIRMED])
 def test_when_the_law_is_mirrored_then_no_longer_lead_is_advised(fault: NotFlown) -> None:
-    coded = replace(SETTINGS, is_narrow=True)
-    advice = verdict_text((fault,), GOOD, replace(coded, is_mirrored=True), {}).splitlines()[-1]
+    narrow = {"channel.downlink": "narrow", "timing.lead_ticks": "auto"}
+    advice = verdict_text((fault,), GOOD, flight(**narrow), {}).splitlines()[-1]
     assert "look at the downlink" in advice
     assert "timing.lead_ticks" not in advice
+    coded = flight(**narrow | {"downlink.scheme": "coded"})
     assert "timing.lead_ticks" in verdict_text((fault,), GOOD, coded, {})
 
 
 def test_when_it_is_reported_then_with_its_numbers_and_what_to_change() -> None:
     endless = replace(GOOD, confirmed=101, erased=0, rejoins=99, ticks_down=4860, ticks_commanded=1010)
     faults = faults_of(endless)
-    text = verdict_text(faults, endless, SETTINGS, {"desync": 1, "guard": 98})
+    text = verdict_text(faults, endless, flight(), {"desync": 1, "guard": 98})
     assert text.splitlines() == [
         "the flight did not fly (rejoins without end, too few samples confirmed, guard down): "
         "101 of 600 samples confirmed, 0 of these erased, guard down for 81% of the flight, "
@@ -82,10 +83,22 @@ def test_when_it_is_reported_then_with_its_numbers_and_what_to_change() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spread_s", "advice"),
-    [(0.0, "nearly all symbols are lost"), (0.6, "set it to at least 0.6 at both ends")],
+    ("impairments", "advice"),
+    [
+        ("", "nearly all symbols are lost"),
+        ("up:delay=0.3s±0.3s", "set it to at least 0.6 at both ends"),
+    ],
 )
-def test_when_no_words_come_then_the_advice_follows_from_the_line(spread_s: float, advice: str) -> None:
+def test_when_no_words_come_then_the_advice_follows_from_the_line(
+    impairments: str, advice: str
+) -> None:
     deaf = replace(GOOD, erased=600)
-    text = verdict_text(faults_of(deaf), deaf, replace(SETTINGS, uplink_spread_s=spread_s), {})
+    line = flight(
+        **{
+            "link.impairments": impairments,
+            "timing.lead_ticks": "auto",
+            "transmitter.watchdog_s": "auto",
+        }
+    )
+    text = verdict_text(faults_of(deaf), deaf, line, {})
     assert advice in text

@@ -14,7 +14,7 @@ from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.codec.signals import InputSignal, Signal, Signals
 from tenbaud import FlightResult, Run, fly
-from tenbaud.flight.closing import closing_lines
+from tenbaud.flight.report import closing_lines
 from tenbaud.recording.convert import convert
 from tenbaud.recording.encoding import SIGNALS_KEY, recorded_signals, signals_text
 from tenbaud.recording.errors import RecordingError
@@ -104,7 +104,7 @@ def test_the_figure_of_many_bits_shows_the_share_that_was_about_each_output(run:
         "about": [[0], [0], [0], [1]] * 400,
     }
     overview = Overview(run.plant)
-    overview.add("sample", [at * 100_000_000 for at in range(1600)], rows.get)
+    overview.add("sample", [at * 100_000_000 for at in range(1600)], rows)
     stored = unpacked(packed(overview), run.plant)
     assert stored is not None
     for one in (overview, stored):

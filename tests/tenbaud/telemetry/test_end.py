@@ -23,7 +23,7 @@ class Silent:
 
 
 def telemetry_end(options: TelemetryOptions) -> TelemetryEnd:
-    return TelemetryEnd(agreement(), "receiver", MemoryRecorder(), options)  # type: ignore[arg-type]
+    return TelemetryEnd(agreement(), "receiver", MemoryRecorder(), options, {})  # type: ignore[arg-type]
 
 
 def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(

@@ -12,6 +12,7 @@ from channel.links.base import Link
 from channel.links.serial.slot_finder import START_NS
 from channel.links.serial.wire import SerialWire
 from channel.protocol.endings import End, Ending
+from channel.protocol.events import EventKind
 from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
@@ -102,3 +103,4 @@ def test_when_the_transmitter_is_held_up_then_its_first_symbols_keep_their_slots
     assert counts["symbols_late"] == counts["symbols_misplaced"] == counts["rejoins"] == 0
     assert session.counts["digest_checks"] == 30 == counts["samples"]
     assert counts["erasures"] == session.counts["words_missed"] <= 1 + after_ms // 100
+    assert [one.kind for one in session.events].count(EventKind.STARTED) == 1

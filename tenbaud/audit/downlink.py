@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import random
 from collections import Counter
 from typing import Any
 
 from channel.errors import CodecDiverged, TenbaudError
 from tenbaud.audit.base import Evidence, Place, claim
-from tenbaud.audit.flights import JITTER_SEED
+from tenbaud.audit.flights import jittered
 from tenbaud.replay.control import controller_of
-from tenbaud.replay.refly import refly
 
 BOTH = "recorded {}, computed {}"
 EPOCH = ("sample", "epoch", "state")
@@ -105,17 +103,8 @@ def check_following(evidence: Evidence) -> None:
     agreement, flown = evidence.agreement, evidence.flown
     if agreement.two_way is None or not flown or evidence.steps:
         return
-    noise, terms = random.Random(JITTER_SEED), evidence.terms
     try:
-        controller = controller_of(agreement.config)
-        again = list(
-            refly(
-                agreement,
-                controller,
-                evidence.epochs,
-                lambda _slot: noise.randint(0, terms.deadline_allowance_ns),
-            )
-        )
+        again = jittered(evidence, controller_of(agreement.config), 0)
     except (CodecDiverged, TenbaudError, ValueError):
         return  # said where the flight was flown from its symbols
     for one, other in zip(flown, again, strict=False):

@@ -42,7 +42,7 @@ def check_rows(evidence: Evidence) -> None:
         held = sum(len(table) for table in tables.topics.values())
         for note in hole_notes(tables.path, tables.holes) + stray_notes(tables.path, tables.strays):
             place.gap("", note)
-        dropped = _count(tables.end.get("rows_dropped", "0"))
+        dropped = int(tables.end.get("rows_dropped", "0"))
         if dropped:
             place.gap("", "the recorder lost rows", f"{dropped}")
         if "error" in tables.end:
@@ -50,7 +50,7 @@ def check_rows(evidence: Evidence) -> None:
         written = tables.end.get("rows_written")
         if tables.end and written is None:
             place.gap("", "the recorder did not say how many rows it wrote")
-        elif written is not None and _count(written) != held:
+        elif written is not None and int(written) != held:
             place.gap("", "not all are there", f"{held} of {written} that were written")
         # The summary of both ends is about the transmitter's recorder, that of one about its own.
         summary = evidence.summary(end)
@@ -94,8 +94,3 @@ def _figures(evidence: Evidence) -> list[tuple[str, str, str, int]]:
         late = sum(not row.taken for row in evidence.topic("receiver", "symbol"))
         found.append(("receiver", "symbol", "symbols_late", late))
     return found
-
-
-def _count(text: str) -> int:
-    """Return a count as the recorder wrote it; -1 for any other text."""
-    return int(text) if text.isdecimal() else -1

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from channel.codec.codec import ERASED, CodecState, Vector
 from channel.codec.downlink.machine import TwoWayState
+from receiver.controllers.base import Controller
 from receiver.session.rejoin import carried_to
 from tenbaud.audit.base import Evidence, claim
 from tenbaud.replay.control import RecordedCommands
@@ -85,13 +86,7 @@ def check_jitter(evidence: Evidence) -> None:
     commands = {tick: command for one in flown for tick, _, _, command in one.ticks}
     # What a narrow downlink sent follows from the controller: `tenbaud.audit.downlink` flies it.
     for seed in range(JITTERED_FLIGHTS if evidence.agreement.two_way is None else 0):
-        noise = random.Random(JITTER_SEED + seed)
-
-        def delay(_slot: int, noise: random.Random = noise) -> int:
-            return noise.randint(0, terms.deadline_allowance_ns)
-
-        repeated = RecordedCommands(commands, terms.initial_command, {})
-        again = list(refly(evidence.agreement, repeated, evidence.epochs, delay))
+        again = jittered(evidence, RecordedCommands(commands, terms.initial_command, {}), seed)
         digests = [one.digest for one in again]
         if digests != expected:
             pairs = zip(flown, again, strict=False)
@@ -99,6 +94,13 @@ def check_jitter(evidence: Evidence) -> None:
             place = evidence.at(evidence.record.consumer, "sample", f"sample {at}")
             place.leak("digest", "other arrival times give another state")
         evidence.jittered_states += len(digests)
+
+
+def jittered(evidence: Evidence, controller: Controller, seed: int) -> list[Reflown]:
+    """Return the flight, flown again with its symbols at other times within their deadlines."""
+    noise, most_ns = random.Random(JITTER_SEED + seed), evidence.terms.deadline_allowance_ns
+    epochs = evidence.epochs
+    return list(refly(evidence.agreement, controller, epochs, lambda _slot: noise.randint(0, most_ns)))
 
 
 def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before) -> bool:

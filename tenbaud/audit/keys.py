@@ -6,7 +6,7 @@ from typing import Any
 
 from channel.protocol.terms import Terms
 from tenbaud.audit.base import FILED, Evidence, claim
-from tenbaud.replay.rows import KINDS
+from tenbaud.recording.kinds import KINDS
 
 KEYED = (
     ("transmitter", "tick"),

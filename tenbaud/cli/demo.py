@@ -113,15 +113,12 @@ def _view_options(
         return None
     from channel.links.endpoints import loopback_host
     from tenbaud.flight.viewing import ViewOptions
-    from tenbaud.view.server import Address, free_port, require_nicegui
+    from tenbaud.view.server import Address, require_nicegui
 
     if len(agreements) > 1 or agreements[0].link.in_process:
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
-    host = loopback_host()
-    address = Address(host, port or free_port(host))
-    address.check()
-    return ViewOptions(address.port, open_browser)
+    return ViewOptions(Address(loopback_host(), port).checked().port, open_browser)
 
 
 def _agree_all(

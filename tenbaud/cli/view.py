@@ -75,11 +75,11 @@ def view(
         options.print_json(schema_json())
         return
     from channel.links.endpoints import loopback_host
-    from tenbaud.view.server import Address, free_port
+    from tenbaud.view.server import Address
 
     # As in a URL, or bare.
     host = loopback_host() if host is None else host.removeprefix("[").removesuffix("]")
-    address = Address(host, port or free_port(host), insecure)
+    address = Address(host, port, insecure)
     if runs:
         if connect or keys or session != "**":
             raise typer.BadParameter(
@@ -121,7 +121,7 @@ def _replay(runs: list[Path], address: Address, open_browser: bool) -> None:
     from tenbaud.view.replay import serve_recorded
 
     # What is wrong with the port is said before minutes of recordings are read.
-    address.check()
+    address = address.checked()
     flights = recorded_flights([Run(one) for one in runs])
     Interruptions.require_none()
     serve_recorded(flights, address, open_browser=open_browser)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from channel.protocol.recording import RecordChannel, Recorder
 from tenbaud.build.flight import Agreement
-from tenbaud.recording.display import picture_html
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.notebook import Cell, progress_html
 from tenbaud.recording.overview import OverviewRecorder
+from tenbaud.recording.style import picture_html
 
 PERIOD_S = 0.5
 DRAWING_SHARE = 0.25
@@ -65,17 +65,11 @@ class NotebookDrawing:
 
 
 class _Passing:
-    """Hands rows on to a recorder, and the drawn ones to an overview too."""
+    """Hands rows on to a recorder and to an overview."""
 
-    def __init__(self, recorder: Recorder, overview: OverviewRecorder) -> None:
-        self._recorder = recorder
-        self._overview = overview
-        self._drawn: dict[int, bool] = {}
+    def __init__(self, *recorders: Recorder) -> None:
+        self._recorders = recorders
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
-        self._recorder.write(channel, time_ns, row)
-        drawn = self._drawn.get(id(channel))
-        if drawn is None:
-            drawn = self._drawn[id(channel)] = self._overview.wants(channel)
-        if drawn:
-            self._overview.add(channel.topic, max(0, time_ns), row)
+        for recorder in self._recorders:
+            recorder.write(channel, time_ns, row)

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from channel.codec.codec import Coder, Model
 from channel.errors import TenbaudError
-from channel.links.endpoints import loopback_host
 from channel.protocol.terms import Clock, Rung
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
@@ -157,10 +156,10 @@ def _looks(agreement: Agreement, show: bool, pace: float | None) -> dict[str, An
         return {"drawing": NotebookDrawing(agreement), "pace": pace}
     if not show:
         return {"pace": pace}
-    from tenbaud.view.server import free_port, require_nicegui
+    from tenbaud.view.server import require_nicegui
 
     require_nicegui()
-    view = ViewOptions(free_port(loopback_host()), open_browser=True)
+    view = ViewOptions(0, open_browser=True)
     return {"view": view, "pace": pace or (1.0 if agreement.clock == "virtual" else None)}
 
 

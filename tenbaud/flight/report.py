@@ -91,10 +91,13 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
 
 def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> None:
     """Draw the figure of a run from its recordings. Raises RecordingError and WriteError."""
-    from tenbaud.recording.figure import draw_flight
+    from tenbaud.recording.figure import FLIGHT_DOTS_PER_INCH, draw_run
+    from tenbaud.recording.style import save
 
     receiver = folder.receiver if folder.receiver.is_file() else None
-    draw_flight(folder.transmitter, receiver, folder.figure, title, usual)
+    # Its recordings were made just now.
+    figure = draw_run(folder.transmitter, receiver, title, own=True, usual=usual)
+    save(figure, [folder.figure], FLIGHT_DOTS_PER_INCH)
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:

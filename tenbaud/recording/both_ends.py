@@ -7,26 +7,17 @@ an epoch the transmitter may lack samples, which is no fault; anything else that
 from __future__ import annotations
 
 from collections.abc import Iterator
-from operator import attrgetter, lt
-from pathlib import Path
-from typing import NamedTuple
 
-from tenbaud.recording.comparison import Compared, Difference, paired, unlike_field
+from tenbaud.recording.comparison import Compared, KeyedRow, paired, unlike_field
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import TRANSMITTER_NAME
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import Row
 
-TOPIC, KEY = "sample", "sample"
+TOPIC = KEY = "sample"
+STATE = ("state", "coder")
 Epoch = tuple[object, object]
 """(number, first sample)"""
-
-
-class _Sample(NamedTuple):
-    epoch: Epoch
-    sample: int
-    time_ns: int
-    row: Row
 
 
 def compare_ends(first: Recording, second: Recording, compared: Compared) -> None:
@@ -35,101 +26,69 @@ def compare_ends(first: Recording, second: Recording, compared: Compared) -> Non
     if not _is_transmitter(first) and _is_transmitter(second):
         ends.reverse()
     upper, lower = ends
-    # An end that recorded no sample at all cannot be checked, and `topic` says so.
-    names = [
-        [field.name for field in end.topic(TOPIC).channel.fields if not field.timing] for end in ends
-    ]
-    fields = [name for name in names[0] if name in names[1]]
-    shared = set(_epochs(upper)) & set(_epochs(lower))
-    walk = _Walk(upper, lower, shared, fields, compared)
-    seen = walk.run()
-    _check_failures(ends, shared, seen, compared)
-    _compare_assumed(upper, lower, compared)
-    alone = len(set(_epochs(lower)) - shared) + len(set(_epochs(upper)) - shared)
-    if alone:
-        compared.notes.append(f"epochs that one end alone began: {alone}; not compared")
-    if walk.unheard:
-        compared.notes.append(
-            f"samples of the receiver that the transmitter never confirmed: {walk.unheard}"
-        )
-
-
-class _Walk:
-    """Both files streaming by, sample by sample."""
-
-    def __init__(
-        self,
-        upper: Recording,
-        lower: Recording,
-        shared: set[Epoch],
-        fields: list[str],
-        compared: Compared,
-    ) -> None:
-        self.unheard = 0
-        """samples at the ends of epochs that the transmitter lacks"""
-        self._upper, self._lower = upper, lower
-        self._shared, self._fields, self._compared = shared, fields, compared
-        self._pending: list[_Sample] = []
-        self._found = False
-        self._failures = {sample for end in (upper, lower) for _, sample in _failures(end)}
-
-    def run(self) -> set[int]:
-        """Compare; return the samples with a recorded failure that were compared."""
-        left, right = _samples(self._upper, self._compared), _samples(self._lower, self._compared)
-        seen: set[int] = set()
-        for here, there in paired(left, right, attrgetter("sample"), lt):
-            if here is None:
-                self._only_lower(there)
-            elif there is not None:
-                self._both(here, there)
-                seen |= {here.sample} & self._failures
-            elif here.epoch in self._shared:
-                self._compared.lacks(self._lower.path, TOPIC, KEY, here.sample)
-        self.unheard += len(self._pending)
-        return seen
-
-    def _only_lower(self, there: _Sample | None) -> None:
-        if there is not None and there.epoch in self._shared:
-            if self._pending and self._pending[-1].epoch != there.epoch:
-                self.unheard += len(self._pending)
-                self._pending.clear()
-            self._pending.append(there)
-
-    def _both(self, here: _Sample, there: _Sample) -> None:
-        compared = self._compared
-        # What was pending lies before a sample that the transmitter does have.
-        for one in self._pending:
-            if one.epoch == here.epoch:
-                compared.lacks(self._upper.path, TOPIC, KEY, one.sample)
-            else:
-                self.unheard += 1
-        self._pending.clear()
-        if here.epoch != there.epoch:
-            compared.faults.append(
-                f"sample {here.sample} is in epoch {here.epoch[0]} for the transmitter and in epoch "
-                f"{there.epoch[0]} for the receiver"
-            )
-            return
-        compared.rows += 1
-        unlike = None if self._found else unlike_field(here.row, there.row, self._fields)
-        if unlike is not None:
-            self._found = True
-            where = (TOPIC, KEY, here.sample, here.time_ns)
-            paths = (self._upper.path, self._lower.path)
-            compared.differences.append(Difference(*where, *unlike, *paths))
-
-
-def _check_failures(
-    ends: list[Recording], shared: set[Epoch], seen: set[int], compared: Compared
-) -> None:
-    """A sample of which a failure was recorded must have been compared."""
-    numbers = {number for number, _ in shared}
+    epochs = [set(_epochs(end)) for end in ends]
+    shared = epochs[0] & epochs[1]
     failed = {pair for end in ends for pair in _failures(end)}
+    samples = {sample for _, sample in failed}
+    seen, unheard = _compare_samples(upper, lower, shared, samples, compared)
+    numbers = {number for number, _ in shared}
     for epoch, sample in sorted(failed):
         if epoch in numbers and sample not in seen:
             compared.faults.append(
                 f"sample {sample} is missing, of which an end recorded that the two differed after it"
             )
+    _compare_assumed(upper, lower, compared)
+    if alone := len(epochs[0] ^ epochs[1]):
+        compared.notes.append(f"epochs that one end alone began: {alone}; not compared")
+    if unheard:
+        compared.notes.append(
+            f"samples of the receiver that the transmitter never confirmed: {unheard}"
+        )
+
+
+def _compare_samples(
+    upper: Recording, lower: Recording, shared: set[Epoch], failed: set[int], compared: Compared
+) -> tuple[set[int], int]:
+    """Compare while both files stream by.
+
+    Return which of the failed samples were compared, and how many samples the transmitter lacks at the
+    ends of epochs.
+    """
+    # An end that recorded no sample at all cannot be checked, and `topic` says so.
+    names = [
+        [field.name for field in end.topic(TOPIC).channel.fields if not field.timing]
+        for end in (upper, lower)
+    ]
+    fields = [name for name in names[0] if name in names[1]]
+    seen, unheard = set[int](), 0
+    pending: list[KeyedRow] = []
+    for here, there in paired(_samples(upper, compared), _samples(lower, compared)):
+        if here is None:
+            if there is not None and there.epoch in shared:
+                pending.append(there)
+            continue
+        if there is None:
+            if here.epoch in shared:
+                compared.lacks(lower.path, TOPIC, KEY, here.key)
+            continue
+        # What was pending lies before a sample that the transmitter does have.
+        for one in pending:
+            if one.epoch == here.epoch:
+                compared.lacks(upper.path, TOPIC, KEY, one.key)
+            else:
+                unheard += 1
+        pending.clear()
+        seen |= {here.key} & failed
+        if here.epoch != there.epoch:
+            numbers = [str(one.epoch[0]) for one in (here, there)]
+            compared.faults.append(
+                f"sample {here.key} is in epoch {numbers[0]} for the transmitter and in epoch "
+                f"{numbers[1]} for the receiver"
+            )
+            continue
+        compared.rows += 1
+        compared.compare((TOPIC, KEY), here, there, fields, (upper.path, lower.path))
+    return seen, unheard + len(pending)
 
 
 def _compare_assumed(upper: Recording, lower: Recording, compared: Compared) -> None:
@@ -139,7 +98,7 @@ def _compare_assumed(upper: Recording, lower: Recording, compared: Compared) -> 
     assumption of word or command symbols was wrong, the states after that need not be equal.
     """
     assumed = {
-        (row["epoch"], row[KEY]): (time_ns, row)
+        (row["epoch"], row[KEY]): KeyedRow(row[KEY], time_ns, row)
         for time_ns, row in upper.rows("assumed")
         if _are_numbers(row, "epoch", KEY)
     }
@@ -149,18 +108,16 @@ def _compare_assumed(upper: Recording, lower: Recording, compared: Compared) -> 
     over: set[object] = set()
     for there in _samples(lower, Compared()):
         number = there.epoch[0]
-        time_ns, here = assumed.get((number, there.sample), (0, None))
+        here = assumed.get((number, there.key))
         if here is None or number in over:
             continue
-        symbols = here.get("symbols") or []
-        same = sent.get(there.sample, [])[: len(symbols)] == symbols
-        same = same and here.get("word") == there.row.get("word")
-        unlike = unlike_field(here, there.row, ["state", "coder"])
-        if not same or unlike is not None:
+        symbols = here.row.get("symbols") or []
+        same = sent.get(there.key, [])[: len(symbols)] == symbols
+        same = same and here.row.get("word") == there.row.get("word")
+        if not same or unlike_field(here.row, there.row, STATE) is not None:
             over.add(number)
-        if same and unlike is not None:
-            where = ("assumed", KEY, there.sample, time_ns)
-            compared.differences.append(Difference(*where, *unlike, upper.path, lower.path))
+        if same:
+            compared.compare(("assumed", KEY), here, there, STATE, (upper.path, lower.path))
 
 
 def _failures(recording: Recording) -> set[tuple[int, int]]:
@@ -175,7 +132,7 @@ def _epochs(recording: Recording) -> list[Epoch]:
     return found or [(0, 0)]
 
 
-def _samples(recording: Recording, compared: Compared) -> Iterator[_Sample]:
+def _samples(recording: Recording, compared: Compared) -> Iterator[KeyedRow]:
     """Yield the samples of an end, with their epochs; what is doubled or out of order is a fault."""
     epochs = _epochs(recording)
     index, before = 0, -1
@@ -192,7 +149,7 @@ def _samples(recording: Recording, compared: Compared) -> Iterator[_Sample]:
             if not isinstance(start, int) or start > sample:
                 break
             index += 1
-        yield _Sample(epochs[index], sample, time_ns, row)
+        yield KeyedRow(sample, time_ns, row, epochs[index])
 
 
 def _are_numbers(row: Row, *names: str) -> bool:
@@ -200,5 +157,4 @@ def _are_numbers(row: Row, *names: str) -> bool:
 
 
 def _is_transmitter(recording: Recording) -> bool:
-    path: Path = recording.path
-    return recording.metadata.get("role", "") == "transmitter" or path.name == TRANSMITTER_NAME
+    return recording.metadata.get("role") == "transmitter" or recording.path.name == TRANSMITTER_NAME

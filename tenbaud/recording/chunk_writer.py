@@ -65,21 +65,16 @@ class ChunkWriter:
         self._metadata.append(MetadataIndex(offset=self._stream.tell(), length=len(data), name=name))
         self._stream.write(data)
 
-    def register_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Add a schema; return its number."""
-        schema = Schema(id=len(self._schemas) + 1, data=data, encoding=encoding, name=name)
-        self._schemas.append(schema)
-        self._chunk += _bytes_of(schema)
-        return schema.id
-
-    def register_channel(self, topic: str, encoding: str, schema_id: int) -> int:
-        """Add a channel; return its number, which its messages are added under."""
+    def register(self, topic: str, schema: bytes) -> int:
+        """Add a channel of JSON messages; return its number, which they are added under."""
         number = len(self._channels) + 1
+        described = Schema(id=number, data=schema, encoding="jsonschema", name=topic)
         channel = Channel(
-            id=number, topic=topic, message_encoding=encoding, metadata={}, schema_id=schema_id
+            id=number, topic=topic, message_encoding="json", metadata={}, schema_id=number
         )
+        self._schemas.append(described)
         self._channels.append(channel)
-        self._chunk += _bytes_of(channel)
+        self._chunk += _bytes_of(described) + _bytes_of(channel)
         return number
 
     def add_message(self, channel_id: int, time_ns: int, data: bytes) -> None:

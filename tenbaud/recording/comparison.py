@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple
 
 from tenbaud.recording.rows import Row
 
@@ -68,6 +68,16 @@ class Missing:
         return f"{what} missing {'at the end of' if self.ends else 'in'} {self.path}"
 
 
+class KeyedRow(NamedTuple):
+    """A row of a topic, by its tick or sample."""
+
+    key: Any
+    time_ns: int
+    row: Row
+    epoch: tuple[object, object] = (0, 0)
+    """number and first sample of its epoch"""
+
+
 @dataclass(slots=True)
 class Compared:
     """The outcome of a comparison."""
@@ -103,6 +113,25 @@ class Compared:
         else:
             self.missing.append(Missing(path, topic, key_name, key, key))
 
+    def compare(
+        self,
+        where: tuple[str, str],
+        here: KeyedRow,
+        there: KeyedRow,
+        fields: Sequence[str],
+        paths: tuple[Path, Path],
+    ) -> None:
+        """Note the first difference of two rows, unless these files differ in the topic already.
+
+        `where` is the topic and the name of its key.
+        """
+        if any((one.topic, one.first, one.second) == (where[0], *paths) for one in self.differences):
+            return
+        unlike = unlike_field(here.row, there.row, fields)
+        if unlike is not None:
+            at = (*where, here.key, here.time_ns)
+            self.differences.append(Difference(*at, *unlike, *paths))
+
     def __str__(self) -> str:
         lines = [] if self.difference is None else [str(self.difference)]
         if self.verdict is Verdict.NOT_COMPARABLE:
@@ -116,22 +145,16 @@ class Compared:
         return "\n".join([*lines, *self.notes])
 
 
-Keyed = TypeVar("Keyed")
-
-
 def paired(
-    left: Iterator[Keyed],
-    right: Iterator[Keyed],
-    key: Callable[[Keyed], Any],
-    is_before: Callable[[Any, Any], bool],
-) -> Iterator[tuple[Keyed | None, Keyed | None]]:
-    """Walk two streams side by side; an item missing in one is paired with None."""
+    left: Iterator[KeyedRow], right: Iterator[KeyedRow]
+) -> Iterator[tuple[KeyedRow | None, KeyedRow | None]]:
+    """Walk two streams side by side; a row missing in one is paired with None."""
     here, there = next(left, None), next(right, None)
     while here is not None or there is not None:
-        if here is not None and there is not None and key(here) == key(there):
+        if here is not None and there is not None and here.key == there.key:
             yield here, there
             here, there = next(left, None), next(right, None)
-        elif here is None or (there is not None and is_before(key(there), key(here))):
+        elif here is None or (there is not None and _is_before(there.key, here.key)):
             yield None, there
             there = next(right, None)
         else:
@@ -139,7 +162,14 @@ def paired(
             here = next(left, None)
 
 
-def unlike_field(here: Row, there: Row, fields: list[str]) -> tuple[str, object, object] | None:
+def _is_before(one: object, other: object) -> bool:
+    """Whether key `one` comes earlier; a key that is no number comes last."""
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return one < other
+    return isinstance(one, int | float)
+
+
+def unlike_field(here: Row, there: Row, fields: Sequence[str]) -> tuple[str, object, object] | None:
     """Return the first of these fields that differs, with its place in a list, and both values."""
     for name in fields:
         one, other = here.get(name, NO_FIELD), there.get(name, NO_FIELD)

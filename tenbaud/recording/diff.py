@@ -9,21 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from operator import itemgetter
 from pathlib import Path
 
 from channel.protocol.recording import RecordChannel
 from tenbaud.recording.both_ends import compare_ends
-from tenbaud.recording.comparison import Compared, Difference, paired, unlike_field
+from tenbaud.recording.comparison import Compared, KeyedRow, paired
 from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder
 from tenbaud.recording.reader import Recording
-from tenbaud.recording.rows import Row
 
 IGNORED_TOPIC = "event"
-
-_KeyedRow = tuple[object, int, Row]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,35 +116,23 @@ def _compare_topic(
 ) -> None:
     topic, key_name = channel.topic, channel.fields[0].name
     left, right = _keyed(first, topic, key_name), _keyed(second, topic, key_name)
-    found = False
     after = [len(compared.missing)] * 2
-    for here, there in paired(left, right, itemgetter(0), _before):
+    for here, there in paired(left, right):
         if here is None and there is not None:
-            compared.lacks(first.path, topic, key_name, there[0])
+            compared.lacks(first.path, topic, key_name, there.key)
             after[1] = len(compared.missing)
         elif there is None and here is not None:
-            compared.lacks(second.path, topic, key_name, here[0])
+            compared.lacks(second.path, topic, key_name, here.key)
             after[0] = len(compared.missing)
         elif here is not None and there is not None:
             compared.rows += 1
             after = [len(compared.missing)] * 2
-            unlike = None if found else unlike_field(here[2], there[2], fields)
-            if unlike is not None:
-                found = True
-                where = (topic, key_name, here[0], here[1])
-                compared.differences.append(Difference(*where, *unlike, first.path, second.path))
+            compared.compare((topic, key_name), here, there, fields, (first.path, second.path))
     for recording, count in ((first, after[0]), (second, after[1])):
         for entry in compared.missing[count:]:
             entry.ends = entry.ends or entry.path == recording.path
 
 
-def _keyed(recording: Recording, topic: str, key_name: str) -> Iterator[_KeyedRow]:
+def _keyed(recording: Recording, topic: str, key_name: str) -> Iterator[KeyedRow]:
     for time_ns, row in recording.rows(topic):
-        yield row.get(key_name), time_ns, row
-
-
-def _before(one: object, other: object) -> bool:
-    """Whether key `one` comes earlier; a key that is no number comes last."""
-    if isinstance(one, int | float) and isinstance(other, int | float):
-        return one < other
-    return isinstance(one, int | float)
+        yield KeyedRow(row.get(key_name), time_ns, row)

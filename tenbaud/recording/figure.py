@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -11,22 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from channel.codec.signals import Signal, Signals
+from channel.codec.signals import Signal
 from channel.line.impairments import parse_impairments
-from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA, recorded_signals
-from tenbaud.recording.envelope import Curve, Series
+from tenbaud.recording.envelope import Curve
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.overview import (
-    FIELDS,
-    Columns,
-    Overview,
-    marks_of,
-    unpacked,
-)
+from tenbaud.recording.overview import FIELDS, Overview, marks_of, unpacked
 from tenbaud.recording.pose import draw_poses, has_poses
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
-from tenbaud.recording.rows import Row
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure
 
 if TYPE_CHECKING:
@@ -44,28 +35,41 @@ STEPS = {"drawstyle": "steps-post"}
 
 SHARES_DRAWN = 100
 """Stretches of a flight of which the share of the bits is drawn."""
+FLIGHT_DOTS_PER_INCH = 150
 DRAWN_MAX = 8
 """Groups of outputs or of inputs that have a panel."""
 
 _Draw = Callable[["Axes", "_Flight"], None]
 
 
-@dataclass(frozen=True, slots=True)
 class _Flight:
-    """The contents of the figure."""
+    """The contents of the figure: curves and marks of a transmitter, thinned to what can be seen."""
 
-    plant: Signals
-    curves: dict[str, list[Curve]]
-    """name of a curve -> that of each output, or of each input"""
-    marks: dict[str, Series]
-    symbols: Curve
-    symbols_are_means: bool
-    about: list[Series]
-    """of each output: which symbols were about it, or their share; nothing where that is not known"""
-    cuts_s: list[tuple[float, float]]
-    """times in which nothing was to pass, on purpose"""
-    usual: Curve | None = None
-    """the first output over 1000 bit/s"""
+    def __init__(
+        self, overview: Overview, theirs: Overview | None, impairments: str, usual: Curve | None
+    ) -> None:
+        """Raises RecordingError where the transmitter recorded no tick."""
+        self.plant = overview.plant
+        held = overview.curves
+        if theirs is not None and theirs.plant == self.plant:
+            held = {**held, "reference": theirs.curves["reference"]}
+        self.curves = {name: [one.curve() for one in curves] for name, curves in held.items()}
+        """name of a curve -> that of each output, or of each input"""
+        times_s = self.curves["value"][0][0] if self.plant.outputs else np.zeros(0)
+        if not len(times_s):
+            raise RecordingError(
+                "The recording holds no ticks: give a transmitter's recording of a flight."
+            )
+        self.marks = {name: marks_of(one) for name, one in overview.marks.items()}
+        self.symbols, self.symbols_are_means = overview.symbols.curve(), overview.symbols.thinned
+        means = sorted(overview.means().items())
+        shares = [one.curve()[1] for _, one in means if one is not overview.symbols]
+        self.about = [] if all(np.isnan(one).all() for one in shares) else shares
+        """of each output: which symbols were about it, or their share; nothing where it is not known"""
+        self.cuts_s = _cuts(impairments, times_s[-1])
+        """times in which nothing was to pass, on purpose"""
+        self.usual = usual
+        """the first output over 1000 bit/s"""
 
     @property
     def live_is_coded(self) -> bool:
@@ -78,21 +82,6 @@ class _Flight:
         return any(not np.isnan(self.curves[name][place][1]).all() for place in places)
 
 
-def draw_flight(
-    transmitter: Path, receiver: Path | None, output: Path, title: str, usual: Curve | None = None
-) -> None:
-    """Draw a flight that was just flown into the PNG file `output`.
-
-    `usual` is its first output over 1000 bit/s.
-    An output is the true one where the rig knows it, else the measured one; the errors are taken
-    from it. The receiver's recording adds the reference. Raises RecordingError if the
-    transmitter's recording holds no flight.
-    """
-    figure = draw_run(transmitter, receiver, title, True, usual)
-    with whole_file(output) as stream:
-        figure.savefig(stream, dpi=150, format="png")
-
-
 def draw_run(
     transmitter: Path | None,
     receiver: Path | None,
@@ -100,8 +89,10 @@ def draw_run(
     own: bool = False,
     usual: Curve | None = None,
 ) -> Figure:
-    """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
+    """Return the figure of a flight. Raises RecordingError where no transmitter recorded a tick.
 
+    An output is the true one where the rig knows it, else the measured one; the errors are taken
+    from it. The receiver's recording adds the reference. `usual` is the first output over 1000 bit/s.
     `own`: the recordings were made just now, and what they store for the figure is trusted.
     """
     if transmitter is None:
@@ -121,7 +112,7 @@ def draw_overviews(
 
     Raises RecordingError where the transmitter recorded no tick.
     """
-    flight = _flight(overview, theirs, impairments, usual)
+    flight = _Flight(overview, theirs, impairments, usual)
     drawn = _panels(flight)
     ratios = [ratio for ratio, _, _ in drawn]
     height = (0.9 + sum(ratios)) / len(drawn)
@@ -186,36 +177,6 @@ def _plain(label: str) -> str:
     return label.replace("$", r"\$")
 
 
-def _flight(
-    overview: Overview, theirs: Overview | None, impairments: str, usual: Curve | None
-) -> _Flight:
-    plant = overview.plant
-    times_s = overview.curves["value"][0].curve()[0] if plant.outputs else np.zeros(0)
-    if not len(times_s):
-        raise RecordingError(
-            "The recording holds no ticks: give a transmitter's recording of a flight."
-        )
-    if theirs is not None and theirs.plant == plant:
-        overview.curves["reference"] = theirs.curves["reference"]
-    return _Flight(
-        plant,
-        {name: [one.curve() for one in held] for name, held in overview.curves.items()},
-        {name: marks_of(one) for name, one in overview.marks.items()},
-        overview.symbols.curve(),
-        overview.symbols.thinned,
-        _about(overview),
-        _cuts(impairments, times_s[-1]),
-        usual,
-    )
-
-
-def _about(overview: Overview) -> list[Series]:
-    shares = [
-        one.curve()[1] for _, one in sorted(overview.means().items()) if one is not overview.symbols
-    ]
-    return [] if all(np.isnan(one).all() for one in shares) else shares
-
-
 def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, str]]:
     """Return the overview of a recording and what the run said about itself, in one pass over its rows.
 
@@ -233,16 +194,13 @@ def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, s
         # The head, which says what is recorded, comes before the rows.
         overview = overview or Overview(recorded_signals(stream.metadata.get(RUN_METADATA, {})))
         for topic, (times, rows) in block.items():
-            names = {one.name for one in stream.channels[topic].fields}
-            overview.add(topic, times, _columns_of(rows, names))
+            there = {one.name for one in stream.channels[topic].fields}
+            names = [name for name in FIELDS[topic] if name in there]
+            overview.add(topic, times, {name: [row[name] for row in rows] for name in names})
     metadata = stream.metadata.get(RUN_METADATA, {})
     overview = overview or Overview(recorded_signals(metadata))
     overview.finish()
     return overview, metadata
-
-
-def _columns_of(rows: Sequence[Row], names: set[str]) -> Columns:
-    return lambda name: [row[name] for row in rows] if name in names else None
 
 
 def _cuts(impairments: str, end_s: float) -> list[tuple[float, float]]:

@@ -27,16 +27,11 @@ QUIET_S = 3.0
 at least once a second while its flight goes on."""
 
 
-def hold(handle: int) -> bool:
-    """Take the lock of an open file for as long as it stays open; False: somebody else has it.
-
-    True also where there are no locks: recording goes on without.
-    """
-    return try_lock(handle) is not False
-
-
 def try_lock(handle: int) -> bool | None:
-    """Return whether the lock was taken; None where there are no locks."""
+    """Take the lock of an open file for as long as it stays open.
+
+    Return whether it was taken; None where there are no locks: recording goes on without.
+    """
     if fcntl is None:
         return None
     try:
@@ -182,6 +177,16 @@ def find_recordings(path: Path) -> list[Path]:
     return found
 
 
+def open_plain(path: Path) -> BinaryIO:
+    """Open a file for reading; OSError for what is missing or no plain file."""
+    # Without O_NONBLOCK a pipe laid in its place would be waited for.
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EINVAL, "it is not a file", str(path))
+    return open(handle, "rb")
+
+
 def read_small(path: Path) -> str:
     """Return the text of a small file of a run folder.
 
@@ -189,10 +194,7 @@ def read_small(path: Path) -> str:
     RecordingError for a symbolic link.
     """
     is_own_file(path)
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    with open(handle, "rb") as stream:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError(errno.EINVAL, "it is no plain file", str(path))
+    with open_plain(path) as stream:
         data = stream.read(SMALL_BYTES_MAX + 1)
     if len(data) > SMALL_BYTES_MAX:
         raise OSError(errno.EFBIG, f"it has more than {SMALL_BYTES_MAX} bytes", str(path))
@@ -220,7 +222,7 @@ def open_new_recording(path: Path) -> BinaryIO:
         stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
         raise write_error(path, error) from error
-    if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
+    if try_lock(stream.fileno()) is False or os.fstat(stream.fileno()).st_size > 0:
         stream.close()
         raise RecordingError(
             f"The recording {path} exists already and is not overwritten. "

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import orjson
 
@@ -24,39 +24,22 @@ EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20
 
 
-class Description(NamedTuple):
-    """One recording. `rows_dropped` is None when the file was cut before it could say."""
-
-    recording: Recording
-    rows_dropped: int | None
-    error: str | None
-    notes: list[str]
-    """another version, holes"""
-    events: list[Row]
-    """The first twenty."""
-
-
-def describe(path: Path) -> list[Description]:
-    """Describe a recording, or each recording of a run folder.
+def describe_text(path: Path) -> str:
+    """Describe a recording, or each recording of a run folder, headed by the run's figures.
 
     Raises RecordingError if there is none or a file is not a recording.
     """
-    return [_describe_file(file) for file in find_recordings(path)]
-
-
-def describe_text(path: Path) -> str:
-    """The same for a person, as plain text; for a run folder headed by the run's figures."""
-    described = describe(path)
+    recordings = [Recording(file) for file in find_recordings(path)]
     printed: set[object] = set()
-    parts = [_headline(path), *[_text(description, printed) for description in described]]
-    if not all(description.recording.complete for description in described):
+    parts = [_headline(path), *[_text(recording, printed) for recording in recordings]]
+    if not all(recording.complete for recording in recordings):
         parts.append(f"`tenbaud recover {path}` repairs truncated or damaged files")
     return printable("\n\n".join(part for part in parts if part))
 
 
 def describe_json(path: Path) -> list[dict[str, Any]]:
     """The same for a program: plain dictionaries."""
-    return [_plain(description) for description in describe(path)]
+    return [_plain(Recording(file)) for file in find_recordings(path)]
 
 
 def _headline(path: Path) -> str:
@@ -81,15 +64,20 @@ def _headline(path: Path) -> str:
     return ", ".join(part for part in parts if part) + certain
 
 
-def _plain(description: Description) -> dict[str, Any]:
-    recording = description.recording
+def _plain(recording: Recording) -> dict[str, Any]:
+    end = recording.metadata_record(END_METADATA)
+    dropped = end.get("rows_dropped", "")
     return {
         "path": str(recording.path),
         "size_bytes": recording.path.stat().st_size,
         "complete": recording.complete,
-        "rows_dropped": description.rows_dropped,
-        "error": description.error,
-        "notes": description.notes,
+        # null: the file was cut before it could say
+        "rows_dropped": int(dropped) if dropped.isascii() and dropped.isdigit() else None,
+        "error": end.get("error"),
+        # Whether it was cut is said beside its size.
+        "notes": recording_notes(
+            recording.path, recording.metadata, True, recording.holes, recording.strays
+        ),
         "holes": [asdict(hole) for hole in recording.holes],
         "metadata": recording.metadata,
         "topics": {
@@ -101,38 +89,23 @@ def _plain(description: Description) -> dict[str, Any]:
             }
             for topic, table in recording.topics.items()
         },
-        "events": description.events,
+        "events": [row for _, row in islice(recording.rows(EVENT_TOPIC), EVENTS_SHOWN)],
     }
 
 
-def _describe_file(path: Path) -> Description:
-    recording = Recording(path)
-    end = recording.metadata_record(END_METADATA)
-    # Whether it was cut is said beside its size.
-    notes = recording_notes(path, recording.metadata, True, recording.holes, recording.strays)
-    events = [row for _, row in islice(recording.rows(EVENT_TOPIC), EVENTS_SHOWN)]
-    return Description(recording, _count(end.get("rows_dropped")), end.get("error"), notes, events)
-
-
-def _count(text: str | None) -> int | None:
-    """Return a number that the recorder wrote at the end."""
-    return int(text) if text is not None and text.isascii() and text.isdigit() else None
-
-
-def _text(description: Description, printed: set[object]) -> str:
+def _text(recording: Recording, printed: set[object]) -> str:
     """Return a recording as text; of what the other end's has `printed`, only the names."""
-    recording, state = description.recording, "complete"
+    plain, state = _plain(recording), "complete"
     if not recording.complete:
         state = "damaged: these are the rows that are whole"
         if not recording.holes:
             state = "cut: these are the rows up to the cut"
-    size = recording.path.stat().st_size / 1e6
-    lines = [str(recording.path), f"  {size:.2f} MB, {state}"]
-    if description.rows_dropped:
-        lines.append(f"  {description.rows_dropped} rows were dropped")
-    if description.error is not None:
-        lines.append(f"  {description.error}")
-    lines += [f"  {note}" for note in description.notes]
+    lines = [str(recording.path), f"  {plain['size_bytes'] / 1e6:.2f} MB, {state}"]
+    if plain["rows_dropped"]:
+        lines.append(f"  {plain['rows_dropped']} rows were dropped")
+    if plain["error"] is not None:
+        lines.append(f"  {plain['error']}")
+    lines += [f"  {note}" for note in plain["notes"]]
     same = [item for item in recording.metadata.items() if item in printed]
     for name, value in recording.metadata.items():
         if (name, value) not in printed:
@@ -141,16 +114,13 @@ def _text(description: Description, printed: set[object]) -> str:
         lines.append(f"  as above: {', '.join(name for name, _ in same)}")
     for topic, table in recording.topics.items():
         known = table.channel in printed
-        lines.append("")
-        lines.append(f"  {topic}: {_span(table)}{', fields as above' if known else ''}")
+        lines += ["", f"  {topic}: {_span(table)}{', fields as above' if known else ''}"]
         lines.extend([] if known else _field_lines(table.channel))
     printed |= {*recording.metadata.items(), *[one.channel for one in recording.topics.values()]}
-    if description.events:
-        total = len(recording.topics[EVENT_TOPIC])
-        shown = len(description.events)
-        lines.append("")
-        lines.append("  events" if shown == total else f"  the first {shown} of {total} events")
-        lines.extend(f"    {_event_line(row)}" for row in description.events)
+    if plain["events"]:
+        total, shown = len(recording.topics[EVENT_TOPIC]), len(plain["events"])
+        lines += ["", "  events" if shown == total else f"  the first {shown} of {total} events"]
+        lines.extend(f"    {_event_line(row)}" for row in plain["events"])
     return "\n".join(lines)
 
 

@@ -7,7 +7,7 @@ else reads the rows: the statements of a file about its rows may be false.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any
 
@@ -41,8 +41,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 """The topics and fields that are looked at."""
 
-Columns = Callable[[str], list[Any] | None]
-"""Field name -> its values in some rows; None if these rows have no such field."""
+Columns = Mapping[str, Sequence[Any]]
+"""Field name -> its values in some rows; a field that these rows do not have is not there."""
 
 
 class Overview:
@@ -101,29 +101,26 @@ class Overview:
     def _add_ticks(self, times: Series, columns: Columns) -> None:
         outputs = len(self.plant.outputs)
         for name, width in (("reference", outputs), ("applied", len(self.plant.inputs))):
-            found = columns(name)
-            if found is not None:
-                self._add_curves(name, times, _table(found, width))
-        measured = columns("measured")
-        if measured is None:
+            if name in columns:
+                self._add_curves(name, times, _table(columns[name], width))
+        if "measured" not in columns:
             return
-        values = _table(measured, outputs)
-        true = columns("true")
-        if true is not None:
-            known = _table(true, outputs)
+        values = _table(columns["measured"], outputs)
+        if "true" in columns:
+            known = _table(columns["true"], outputs)
             values = np.where(np.isnan(known), values, known)
         self._add_curves("value", times, values)
-        self._values.update(zip(columns("tick") or (), values.tolist(), strict=False))
+        self._values.update(zip(columns.get("tick", ()), values.tolist(), strict=False))
         self._join()
 
     def _add_estimates(self, times: Series, columns: Columns) -> None:
-        coded, live = (self._outputs(columns(name) or ()) for name in ("coded_state", "live_state"))
+        coded, live = (self._outputs(columns.get(name, ())) for name in ("coded_state", "live_state"))
         if not len(times) == len(coded) == len(live):
             return
         self._add_curves("coded", times, coded)
         self._add_curves("live", times, live)
         rows = np.column_stack((times, coded, live)).tolist()
-        self._waiting.update(zip(columns("tick") or (), rows, strict=False))
+        self._waiting.update(zip(columns.get("tick", ()), rows, strict=False))
         self._join()
 
     def _outputs(self, states: Sequence[Any]) -> Series:
@@ -151,13 +148,12 @@ class Overview:
                     del waiting[tick]
 
     def _add_samples(self, times: Series, columns: Columns) -> None:
-        words = columns("word")
-        if words is None:
+        if "word" not in columns:
             return
-        sent = columns("word_sent") or [None] * len(words)
-        ranges = columns("range")
-        if ranges is not None:
-            self._add_curves("range", times, _table(ranges, len(self.plant.outputs)))
+        words = columns["word"]
+        sent = columns.get("word_sent", [None] * len(words))
+        if "range" in columns:
+            self._add_curves("range", times, _table(columns["range"], len(self.plant.outputs)))
         erased = np.array([word is None for word in words])
         flipped = np.array(
             [
@@ -167,7 +163,7 @@ class Overview:
         )
         self._mark("erased", times[erased])
         self._mark("flipped", times[flipped])
-        about = columns("about") or [None] * len(words)
+        about = columns.get("about", [None] * len(words))
         held = zip(self._last_words, (times.tolist(), words, about), strict=True)
         times_s, words, about = ([*before, *new] for before, new in held)
         # The symbols of a word fill its sample period evenly, which the next row tells.
@@ -190,7 +186,7 @@ class Overview:
                 means.add(times, np.where(np.isnan(outputs), np.nan, outputs == place))
 
     def _add_events(self, times: Series, columns: Columns) -> None:
-        for time_s, kind in zip(times, columns("kind") or [], strict=False):
+        for time_s, kind in zip(times, columns.get("kind", ()), strict=False):
             if kind in ("desync", "rejoin"):
                 self._mark(kind, np.array([time_s]))
 
@@ -252,23 +248,25 @@ def unpacked(metadata: Mapping[str, str], plant: Signals) -> Overview | None:
 
 
 class OverviewRecorder:
-    """Gathers an overview from rows as they are recorded, some at a time."""
+    """A `Recorder` that gathers an overview from the rows written to it, some at a time."""
 
     def __init__(self, plant: Signals) -> None:
         self._overview = Overview(plant)
         self._rows: dict[str, tuple[list[int], list[Sequence[object]]]] = {}
-        self._places: dict[str, dict[str, int]] = {}
+        self._names: dict[str, list[str]] = {}
         self._count = 0
 
-    def wants(self, channel: RecordChannel) -> bool:
-        """Whether rows of this channel are to be handed to `add`."""
-        self._places[channel.topic] = {one.name: place for place, one in enumerate(channel.fields)}
-        self._rows.setdefault(channel.topic, ([], []))
-        return channel.topic in FIELDS
-
-    def add(self, topic: str, time_ns: int, row: Sequence[object]) -> None:
-        times, rows = self._rows[topic]
-        times.append(time_ns)
+    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
+        """Take one row, filed at tick 0 where it came before."""
+        topic = channel.topic
+        held = self._rows.get(topic)
+        if held is None:
+            if topic not in FIELDS:
+                return
+            self._names[topic] = [one.name for one in channel.fields]
+            held = self._rows[topic] = ([], [])
+        times, rows = held
+        times.append(time_ns if time_ns > 0 else 0)
         rows.append(row)
         if len(rows) >= BLOCK_ROWS:
             self._take(topic)
@@ -290,11 +288,6 @@ class OverviewRecorder:
         times, rows = self._rows[topic]
         self._rows[topic] = ([], [])
         self._count += len(rows)
-        places = self._places[topic]
-
-        def columns(name: str) -> list[Any] | None:
-            place = places.get(name)
-            return None if place is None else [row[place] for row in rows]
-
         if rows:
+            columns = dict(zip(self._names[topic], zip(*rows, strict=True), strict=True))
             self._overview.add(topic, times, columns)

@@ -8,10 +8,8 @@ is a RecordingError. Every command reads recordings with this module.
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO
 
@@ -22,6 +20,7 @@ from channel.protocol.recording import RecordChannel
 from tenbaud.recording.chunks import Damage, Described, RawMessage, metadata_at, summary_of_file
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_schema
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.folder import open_plain
 from tenbaud.recording.holes import HOLES_METADATA, Hole, HoleFinder, unpacked_holes
 from tenbaud.recording.notes import recording_notes
 from tenbaud.recording.old_rows import of_today
@@ -40,21 +39,17 @@ class MessageStream:
     present ones.
     """
 
-    def __init__(self, path: Path, topic: str | None = None, size: int | None = None) -> None:
-        """`topic` restricts the stream to one topic, `size` to the first bytes of a file that grows.
-
-        Raises RecordingError for a wrong file.
-        """
+    def __init__(self, path: Path, size: int | None = None) -> None:
+        """`size` restricts it to the first bytes of a file that grows. RecordingError: a wrong file."""
         with open_recording(path) as stream:
             _check_head(path, stream.read(len(MCAP0_MAGIC)))
         self.path = path
+        self.size = size
         self.complete = False
         self.channels: dict[str, RecordChannel] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.strays = 0
         """rows of channels that the file does not describe"""
-        self._topic = topic
-        self._size = size
         self._schemas: dict[int, Schema] = {}
         self._topics: dict[int, str | None] = {}
         self._finder = HoleFinder()
@@ -75,30 +70,24 @@ class MessageStream:
 
     def undecoded(self) -> Iterator[tuple[str, int, bytes]]:
         """The same messages as the bytes in the file: for counting, where decoding is wasted."""
-        wanted = self._topic
         for messages in self._blocks():
             for channel_id, time_ns, data in messages:
                 topic = self._topics[channel_id]
-                if topic is not None and (wanted is None or wanted == topic):
+                if topic is not None:
                     yield topic, time_ns, data
 
     def texts(self) -> Iterator[dict[str, tuple[list[int], list[bytes]]]]:
         """Yield block by block what each topic has there: times in ns and undecoded rows."""
         for messages in self._blocks():
-            found: dict[int, tuple[list[int], list[bytes]]] = {}
-            for channel_id, time_ns, data in messages:
-                if channel_id not in found:
-                    found[channel_id] = ([], [])
-                times, texts = found[channel_id]
-                times.append(time_ns)
-                texts.append(data)
             block: dict[str, tuple[list[int], list[bytes]]] = {}
-            for channel_id, (times, texts) in found.items():
+            for channel_id, time_ns, data in messages:
                 topic = self._topics[channel_id]
-                if topic is not None and self._topic in (None, topic):
-                    before = block.setdefault(topic, ([], []))
-                    before[0].extend(times)
-                    before[1].extend(texts)
+                if topic is not None:
+                    if topic not in block:
+                        block[topic] = ([], [])
+                    times, texts = block[topic]
+                    times.append(time_ns)
+                    texts.append(data)
             yield block
 
     def _blocks(self) -> Iterator[list[RawMessage]]:
@@ -106,7 +95,7 @@ class MessageStream:
         footer_seen = damaged = False
         with open_recording(self.path) as stream:
             there = os.fstat(stream.fileno()).st_size
-            size = there if self._size is None else min(there, self._size)
+            size = there if self.size is None else min(there, self.size)
             for block in blocks_of_file(stream, size):
                 if isinstance(block, Damage):
                     damaged = True
@@ -167,16 +156,6 @@ class MessageStream:
         return channel
 
 
-@dataclass(slots=True)
-class _Survey:
-    complete: bool
-    holes: list[Hole]
-    strays: int
-    size: int
-    metadata: dict[str, dict[str, str]]
-    topics: dict[str, Table]
-
-
 class Recording:
     """One recording, looked at as a whole. The file is read once for its summary, at first need."""
 
@@ -184,13 +163,14 @@ class Recording:
         """Raises RecordingError if there is no such file, or if it is empty or no MCAP file."""
         MessageStream(path)
         self.path = path
+        self._tables: dict[str, Table] = {}
 
     @property
     def complete(self) -> bool:
         """False if the file was cut or damaged; its rows are then those that are whole."""
         return self._survey.complete
 
-    @property
+    @cached_property
     def holes(self) -> list[Hole]:
         """The gaps between rows."""
         return self._survey.holes
@@ -226,10 +206,6 @@ class Recording:
         """Notes to read before trusting results from this recording."""
         return recording_notes(self.path, self.metadata, self.complete, self.holes, self.strays)
 
-    @property
-    def topics(self) -> dict[str, Table]:
-        return self._survey.topics
-
     def topic(self, name: str) -> Table:
         """Return a topic; RecordingError if there is none."""
         if name not in self.topics:
@@ -248,7 +224,7 @@ class Recording:
             if topic in self.topics
         }
         found = {topic: Filling(self.topics[topic], columns) for topic, columns in names.items()}
-        for block in rows_in_blocks(MessageStream(self.path, size=self._survey.size), names):
+        for block in rows_in_blocks(MessageStream(self.path, self._survey.size), names):
             for topic, (times_ns, rows) in block.items():
                 found[topic].add(times_ns, rows)
         for filling in found.values():
@@ -257,30 +233,27 @@ class Recording:
     def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
         """Stream (flight time in ns, row) of one topic; nothing if the topic is absent."""
         # All passes end where the first one did, also in a file that still grows.
-        size = self.__dict__["_survey"].size if "_survey" in self.__dict__ else None
-        for times, rows in _blocks(self.path, topic, size):
-            yield from zip(times, rows, strict=True)
+        size = self._survey.size if "_survey" in vars(self) else None
+        for block in rows_in_blocks(MessageStream(self.path, size), {topic: None}):
+            yield from zip(*block[topic], strict=True)
 
     @cached_property
-    def _survey(self) -> _Survey:
-        size = self.path.stat().st_size
-        stream = MessageStream(self.path, size=size)
-        topics: dict[str, Table] = {}
+    def topics(self) -> dict[str, Table]:
+        _ = self._survey
+        return self._tables
+
+    @cached_property
+    def _survey(self) -> MessageStream:
+        """The file read to its end, its rows counted."""
+        stream = MessageStream(self.path, self.path.stat().st_size)
+        tables: dict[str, Table] = {}
         for block in stream.texts():
             for topic, (times, _) in block.items():
-                if topic not in topics:
-                    blocks = partial(_blocks, self.path, topic, size)
-                    topics[topic] = Table(self.path, stream.channels[topic], blocks)
-                topics[topic].count(times)
-        return _Survey(stream.complete, stream.holes, stream.strays, size, stream.metadata, topics)
-
-
-def _blocks(
-    path: Path, topic: str, size: int | None, names: Sequence[str] | None = None
-) -> Iterator[tuple[list[int], list[Row]]]:
-    """Stream times and rows of one topic many at a time; only fields in `names` are checked."""
-    for block in rows_in_blocks(MessageStream(path, topic, size), {topic: names}):
-        yield block[topic]
+                if topic not in tables:
+                    tables[topic] = Table(self, stream.channels[topic])
+                tables[topic].count(times)
+        self._tables = tables
+        return stream
 
 
 def rows_in_blocks(
@@ -319,15 +292,7 @@ def stored_metadata(path: Path, names: Sequence[str]) -> dict[str, dict[str, str
 def open_recording(path: Path) -> BinaryIO:
     """Open a recording for reading. Raises RecordingError for what is missing or no plain file."""
     try:
-        # Without O_NONBLOCK a pipe laid in a recording's place would be waited for.
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            os.close(handle)
-            raise RecordingError(
-                f"The recording {path} cannot be read: it is not a file. "
-                "Check the path; `runs/` holds one folder per run."
-            )
-        return open(handle, "rb")
+        return open_plain(path)
     except OSError as error:
         raise RecordingError(
             f"The recording {path} cannot be read: {error.strerror or error}. "

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import BinaryIO
 
-from tenbaud.files.whole import write_error
+from tenbaud.files.whole import whole_path
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings, in_use
 from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
-from tenbaud.recording.reader import MessageStream, open_recording
+from tenbaud.recording.reader import MessageStream, Recording, open_recording
 from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
 
 RECOVERED_NOTE = "recovered"
@@ -77,24 +77,21 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
     target = output or path
     kept = None if output is not None else path.with_name(f"{path.stem}.cut{path.suffix}")
     with _held(path) as damaged:
+        found = Recording(path)
+        if found.complete:
+            tables = found.topics.values()
+            last_ns = max((table.last_time_ns for table in tables), default=0)
+            return Recovered(path, None, sum(map(len, tables)), last_ns)
+        for taken in (output, kept):
+            if taken is not None and os.path.lexists(taken):
+                raise _exists(taken)
         stream = MessageStream(path)
-        try:
-            with _unfinished(target) as (whole, unfinished):
+        with whole_path(target) as part:
+            with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as whole:
                 rows, last_ns = _copy(stream, whole)
-                if stream.complete:
-                    return Recovered(path, None, rows, last_ns)
-                for taken in (output, kept):
-                    if taken is not None and os.path.lexists(taken):
-                        raise _exists(taken)
-                unfinished.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
-                os.fsync(whole.fileno())
-                # Windows gives no open file another name.
-                whole.close()
-                if kept is not None:
-                    _keep(path, kept, damaged)
-                unfinished.replace(target)
-        except OSError as error:
-            raise write_error(target, error) from error
+            part.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
+            if kept is not None:
+                _keep(path, kept, damaged)
     return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
 
 
@@ -115,18 +112,6 @@ def _held(path: Path) -> Iterator[BinaryIO]:
         if not os.path.samestat(os.fstat(stream.fileno()), path.lstat()):
             raise RecordingError(f"{path} was replaced while it was opened. Look at it and try again.")
         yield stream
-
-
-@contextlib.contextmanager
-def _unfinished(target: Path) -> Iterator[tuple[BinaryIO, Path]]:
-    """A new file beside `target`, under a name that nobody else has; removed if it is still there."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".unfinished", dir=target.parent)
-    path = Path(name)
-    try:
-        with open(handle, "wb") as stream:
-            yield stream, path
-    finally:
-        path.unlink(missing_ok=True)
 
 
 def _keep(path: Path, kept: Path, damaged: BinaryIO) -> None:
@@ -154,27 +139,20 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
     channels: dict[str, int] = {}
     writer = ChunkWriter(output, CHUNK_BYTES)
     writer.start(profile=PROFILE, library="tenbaud")
-    headed = False
-    for topic, time_ns, data in stream.undecoded():
-        if not headed:
-            headed = True
-            writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    messages = stream.undecoded()
+    first = [*islice(messages, 1)]  # the head comes before it
+    writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    for topic, time_ns, data in chain(first, messages):
         if topic not in channels:
-            channel = stream.channels[topic]
-            schema = writer.register_schema(topic, "jsonschema", channel_schema(channel))
-            channels[topic] = writer.register_channel(topic, "json", schema)
+            channels[topic] = writer.register(topic, channel_schema(stream.channels[topic]))
         writer.add_message(channels[topic], time_ns, data)
         rows += 1
         last_ns = max(last_ns, time_ns)
-    if not headed:
-        writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
     writer.flush()
     if stream.holes:
         writer.add_metadata(HOLES_METADATA, packed_holes(stream.holes))
     end = stream.metadata.get(END_METADATA, {"rows_written": str(rows)})
-    if not stream.complete:
-        end = {**end, "rows_recovered": str(rows), RECOVERED_NOTE: RECOVERED_TEXT}
+    end = {**end, "rows_recovered": str(rows), RECOVERED_NOTE: RECOVERED_TEXT}
     writer.add_metadata(END_METADATA, end)
     writer.finish()
-    output.flush()
     return rows, last_ns

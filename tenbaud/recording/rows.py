@@ -8,27 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import orjson
 
-from channel.protocol.events import EVENT_CHANNEL
-from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import (
-    ARRIVED_CHANNEL,
-    DOWN_SENT_CHANNEL,
-    DOWN_SYMBOLS_CHANNEL,
-    EPOCH_CHANNEL,
-    SENT_CHANNEL,
-    TWO_WAY_CHANNEL,
-    Field,
-    RecordChannel,
-)
-from receiver.session import records as receiver
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.kinds import KINDS
 from tenbaud.recording.old_rows import OLD_EVENT_CHANNEL, names_of_today, rows_of_today
-from transmitter.metrics.gap import GAP_CHANNEL
-from transmitter.session import records as transmitter
 
 Row = dict[str, Any]
 """Field name to value; the values are those of JSON."""
@@ -38,14 +25,7 @@ KEYS = ("tick", "sample", "slot")
 KEY_MAX = 1 << 53
 ROWS_AT_ONCE = 2000
 
-KNOWN = (
-    *(transmitter.TICK_CHANNEL, transmitter.SAMPLE_CHANNEL, transmitter.ESTIMATE_CHANNEL),
-    *(transmitter.DEVICE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL, SENT_CHANNEL),
-    *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
-    *(TWO_WAY_CHANNEL, DOWN_SYMBOLS_CHANNEL, DOWN_SENT_CHANNEL),
-    *(transmitter.CONFIRMED_CHANNEL, transmitter.HYPOTHESES_CHANNEL),
-    OLD_EVENT_CHANNEL,
-)
+KNOWN = (*(kind.channel for topics in KINDS.values() for kind in topics.values()), OLD_EVENT_CHANNEL)
 """The rows that this version's ends write, and the changed ones of earlier versions."""
 
 NEVER_NULL = {
@@ -60,25 +40,24 @@ NEVER_NULL = {
 """(topic, field) that no end ever leaves out; those that read them need not ask."""
 
 _NONE = type(None)
-_TYPES: dict[str, frozenset[type]] = {
-    "number": frozenset({float, int}),
-    "integer": frozenset({int}),
-    "string": frozenset({str}),
-    "boolean": frozenset({bool}),
-    "numbers": frozenset({list}),
-    "integers": frozenset({list}),
-}
-_ITEM_TYPES: dict[str, frozenset[type]] = {
-    "numbers": frozenset({float, int, _NONE}),
-    "integers": frozenset({int, _NONE}),
-}
-_WORDS = {
-    "number": "a number",
-    "integer": "a whole number",
-    "string": "a text",
-    "boolean": "true or false",
-    "numbers": "a list of numbers",
-    "integers": "a list of whole numbers",
+
+
+class _Type(NamedTuple):
+    """The values of a field's type, besides null."""
+
+    words: str
+    values: frozenset[type]
+    items: frozenset[type] | None = None
+    """of a list"""
+
+
+_TYPES: dict[str, _Type] = {
+    "number": _Type("a number", frozenset({float, int})),
+    "integer": _Type("a whole number", frozenset({int})),
+    "string": _Type("a text", frozenset({str})),
+    "boolean": _Type("true or false", frozenset({bool})),
+    "numbers": _Type("a list of numbers", frozenset({list}), frozenset({float, int, _NONE})),
+    "integers": _Type("a list of whole numbers", frozenset({list}), frozenset({int, _NONE})),
 }
 
 
@@ -110,8 +89,8 @@ def check_channel(channel: RecordChannel) -> None:
     for one in channel.fields:
         known_types = types.get(one.name)
         if known_types and one.type not in known_types:
-            wanted = " or ".join(_WORDS[kind] for kind in sorted(known_types))
-            raise ValueError(f"its field {one.name!r} is {_WORDS[one.type]}, here it is {wanted}")
+            wanted = " or ".join(_TYPES[kind].words for kind in sorted(known_types))
+            raise ValueError(f"its field {one.name!r} is {_TYPES[one.type].words}, here it is {wanted}")
 
 
 class RowDecoder:
@@ -164,15 +143,17 @@ class RowDecoder:
             bad = next(index for index, row in enumerate(rows) if name not in row)
             raise self._error(bad, f"lacks the field {name!r}") from None
         never_null = (self._channel.topic, name) in NEVER_NULL or self._is_key(one)
-        wrong = set(map(type, values)) - _TYPES[one.type] - (set() if never_null else {_NONE})
+        wrong = set(map(type, values)) - _TYPES[one.type].values - (set() if never_null else {_NONE})
         if wrong:
             bad = next(index for index, value in enumerate(values) if type(value) in wrong)
-            raise self._error(bad, f"has {values[bad]!r:.60} for {name!r}: not {_WORDS[one.type]}")
+            raise self._error(
+                bad, f"has {values[bad]!r:.60} for {name!r}: not {_TYPES[one.type].words}"
+            )
         if self._is_key(one) and not -KEY_MAX <= min(values) <= max(values) <= KEY_MAX:
             bad = max(range(len(values)), key=lambda index: abs(values[index]))
             raise self._error(bad, f"has {values[bad]} for {name!r}, which no flight reaches")
-        if one.type in _ITEM_TYPES:
-            allowed = _ITEM_TYPES[one.type]
+        allowed = _TYPES[one.type].items
+        if allowed is not None:
             self._check_items(one, values, allowed - {_NONE} if never_null else allowed)
 
     def _is_key(self, one: Field) -> bool:
@@ -184,7 +165,7 @@ class RowDecoder:
         if wrong:
             for index, value in enumerate(values):
                 if value is not None and wrong.intersection(map(type, value)):
-                    text = f"has {value!r:.60} for {one.name!r}: not {_WORDS[one.type]}"
+                    text = f"has {value!r:.60} for {one.name!r}: not {_TYPES[one.type].words}"
                     raise self._error(index, text)
 
     def _error(self, index: int, what: str) -> RecordingError:

@@ -94,7 +94,7 @@ class SideBySide:
         }
 
     def _repr_html_(self) -> str:
-        from tenbaud.recording.display import picture_html
+        from tenbaud.recording.style import picture_html
 
         return f"<pre>{escape(self.text())}</pre>{picture_html(self.plot())}"
 

@@ -205,22 +205,23 @@ class Definition(NamedTuple):
     make: Maker
 
 
-_OfOutput = Callable[[Source, int, Row], Series | None]
+_OfOutput = Callable[..., Series | None]
+"""of a source and, by name, an output's index `at` and its `row`"""
 
 
 def _tick(end: str, name: str) -> _OfOutput:
-    return lambda source, place, _: source.ticks(end, "tick", name, place)
+    return lambda one, at, row: one.ticks(end, "tick", name, at)
 
 
 _OF_OUTPUT: tuple[tuple[str, str, _OfOutput], ...] = (
     ("reference", "set-point of {}", _tick("receiver", "reference")),
-    ("", "{}, true where the rig knows it, else as measured", lambda one, at, _: one.output(at)),
+    ("", "{}, true where the rig knows it, else as measured", lambda one, at, row: one.output(at)),
     ("measured", "{} as the sensor gives it", _tick("transmitter", "measured")),
-    ("estimate", "the codec's estimate of {}", lambda one, _, row: one.coded(row)),
-    ("estimate_live", "{} as the receiver predicted it", lambda one, _, row: one.live(row)),
+    ("estimate", "the codec's estimate of {}", lambda one, at, row: one.coded(row)),
+    ("estimate_live", "{} as the receiver predicted it", lambda one, at, row: one.live(row)),
     ("error_coded", "{} less its estimate", lambda one, at, row: one.error(at, one.coded(row))),
     ("error_live", "{} less its live estimate", lambda one, at, row: one.error(at, one.live(row))),
-    ("range", "range M for {} before the word", lambda one, at, _: one.samples("range", at)),
+    ("range", "range M for {} before the word", lambda one, at, row: one.samples("range", at)),
 )
 """A signal of an output, its meaning, and its function of the output's index and row."""
 
@@ -255,7 +256,8 @@ def definitions(plant: Signals) -> dict[str, Definition]:
             name = one.name
             if what:
                 name = what if len(plant.outputs) == 1 else f"{what}_{one.name}"
-            add(name, one.unit, meaning.format(one.words), _made(make, place, plant.row(place)))
+            made = partial(make, at=place, row=plant.row(place))
+            add(name, one.unit, meaning.format(one.words), made)
     only = f"{plant.outputs[0].name}_" if len(plant.outputs) == 1 else ""
     for state, one in enumerate(plant.states):
         if state not in plant.output_states:
@@ -277,10 +279,6 @@ def definitions(plant: Signals) -> dict[str, Definition]:
         meaning = "output that the tick's symbol was about, from 0; NaN: erased"
         add("about", "", meaning, lambda one: one.word("about"))
     return found | _OF_ALL
-
-
-def _made(make: _OfOutput, place: int, row: Row) -> Maker:
-    return lambda source: make(source, place, row)
 
 
 def output_name(plant: Signals, what: str, place: int) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -60,10 +61,19 @@ def decimated(times: Series, values: Series) -> tuple[Series, Series]:
     return thin(np.asarray(times), np.asarray(values), POINTS)
 
 
-def save(figure: Figure, paths: Sequence[Path]) -> None:
+def save(figure: Figure, paths: Sequence[Path], dots_per_inch: int = 100) -> None:
     """Write the figure to each path; the ending says in which format."""
     for path in paths:
         # A fixed salt and no date: the same data give the same file.
         unwritten = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix, "Software")
         with whole_file(path) as stream:
-            figure.savefig(stream, dpi=100, metadata={unwritten: None}, format=path.suffix[1:])
+            style: dict[str, Any] = {"metadata": {unwritten: None}, "format": path.suffix[1:] or "png"}
+            figure.savefig(stream, dpi=dots_per_inch, **style)
+
+
+def picture_html(figure: Figure, dots_per_inch: int = 90) -> str:
+    """Return a figure as an image in HTML."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=dots_per_inch)
+    data = b64encode(stream.getvalue()).decode()
+    return f'<img alt="outputs and estimate errors over time" src="data:image/png;base64,{data}">'

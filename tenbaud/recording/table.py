@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,6 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.rows import KEYS, Row
 
 Series = NDArray[np.float64]
-Blocks = Callable[[Sequence[str] | None], Iterator[tuple[list[int], list[Row]]]]
-"""(names of the fields that will be used, None: all) -> flight times and rows, many at a time"""
 
 CELLS_PER_ROW_MAX = 1024
 """Values in a list, each a column; a codec's state has some ten."""
@@ -30,6 +28,18 @@ class MissingColumn(RecordingError, KeyError):
     __str__ = RecordingError.__str__
 
 
+class Source(Protocol):
+    """The recording that a table is of."""
+
+    path: Path
+
+    def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
+        """Stream flight times and rows."""
+
+    def read(self, wanted: Mapping[str, Sequence[str]]) -> None:
+        """Fill columns of topics in one pass."""
+
+
 class Table:
     """The rows of one topic, read from the file when they are first asked for.
 
@@ -38,11 +48,10 @@ class Table:
     take some tenth of the memory of `rows`.
     """
 
-    def __init__(self, path: Path, channel: RecordChannel, blocks: Blocks) -> None:
+    def __init__(self, source: Source, channel: RecordChannel) -> None:
         self.channel = channel
         self.first_time_ns = self.last_time_ns = 0
-        self._path = path
-        self._blocks = blocks
+        self._source = source
         self._count = 0
         self._columns: dict[str, NDArray[Any]] = {}
         self._times_ns: NDArray[np.uint64] | None = None
@@ -57,12 +66,7 @@ class Table:
     def rows(self) -> list[Row]:
         """The rows as they were recorded, in the order of the file: all of them as objects."""
         with _collector_paused():
-            return [row for rows in self.blocks() for row in rows]
-
-    def blocks(self) -> Iterator[list[Row]]:
-        """Stream the rows, many at a time."""
-        for _, rows in self._blocks(None):
-            yield rows
+            return [row for _, row in self._source.rows(self.channel.topic)]
 
     def __len__(self) -> int:
         return self._count
@@ -114,10 +118,7 @@ class Table:
         )
 
     def _read(self, fields: Sequence[Field]) -> None:
-        filling = Filling(self, [one.name for one in fields])
-        for times_ns, rows in self._blocks([one.name for one in fields]):
-            filling.add(times_ns, rows)
-        filling.finish()
+        self._source.read({self.channel.topic: [one.name for one in fields]})
 
     def _keep(self, times: list[NDArray[np.uint64]], parts: dict[str, list[NDArray[Any]]]) -> None:
         self._times_ns = np.concatenate(times) if times else np.zeros(0, dtype=np.uint64)
@@ -133,7 +134,7 @@ class Table:
         width = max((len(value) for value in values if value is not None), default=0)
         if width > CELLS_PER_ROW_MAX:
             raise RecordingError(
-                f"{self._path}: a row of the topic {self.channel.topic!r} has {width} values "
+                f"{self._source.path}: a row of the topic {self.channel.topic!r} has {width} values "
                 f"in its field {one.name!r}, at most {CELLS_PER_ROW_MAX} are read."
             )
         if width and all(value is not None and len(value) == width for value in values):
@@ -161,7 +162,7 @@ class Table:
         """All lists of a recorded field have one length; single long ones would ask for much memory."""
         if width > 16 and width * rows > 4 * items + (1 << 20):
             raise RecordingError(
-                f"{self._path}: the lists in the field {one.name!r} of the topic "
+                f"{self._source.path}: the lists in the field {one.name!r} of the topic "
                 f"{self.channel.topic!r} have up to {width} values, and most far fewer. tenbaud writes "
                 "no such field: the file was changed, or another program wrote it."
             )

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from channel.protocol.recording import RecordChannel
 from tenbaud.recording.chunk_writer import ChunkWriter
@@ -222,16 +222,12 @@ class McapRecorder:
             # MCAP times are unsigned; what happens before tick 0 is filed at zero.
             log_time_ns = time_ns if time_ns > 0 else 0
             self._writer.add_message(entry.channel_id, log_time_ns, data)
-            if entry.gather is not None:
-                entry.gather(channel.topic, log_time_ns, row)
+            if self._overview is not None:
+                self._overview.write(channel, log_time_ns, row)
 
     def _register(self, channel: RecordChannel) -> _ChannelWriter:
-        schema_id = self._writer.register_schema(channel.topic, "jsonschema", channel_schema(channel))
-        channel_id = self._writer.register_channel(channel.topic, "json", schema_id)
-        overview = self._overview
-        gather = overview.add if overview is not None and overview.wants(channel) else None
-        entry = _ChannelWriter(channel, channel_id, gather)
-        self._writers[id(channel)] = entry
+        number = self._writer.register(channel.topic, channel_schema(channel))
+        entry = self._writers[id(channel)] = _ChannelWriter(channel, number, row_encoder(channel))
         return entry
 
     def _flush(self) -> None:
@@ -289,17 +285,12 @@ class McapRecorder:
             self.error = text
 
 
-_Gather = Callable[[str, int, Sequence[object]], None]
-
-
-class _ChannelWriter:
+class _ChannelWriter(NamedTuple):
     """The thread's data about one channel. It holds the channel so that its id stays in use."""
 
-    def __init__(self, channel: RecordChannel, channel_id: int, gather: _Gather | None) -> None:
-        self.channel = channel
-        self.channel_id = channel_id
-        self.encode = row_encoder(channel)
-        self.gather = gather
+    channel: RecordChannel
+    channel_id: int
+    encode: Callable[[Sequence[object]], bytes]
 
 
 def _bad_row_text(path: Path, channel: RecordChannel, row: Sequence[object], error: Exception) -> str:

@@ -16,10 +16,10 @@ from channel.codec.downlink.machine import TwoWay
 from channel.codec.lead import FlownSample
 from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
+from tenbaud.recording.kinds import KINDS
 from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.replay.pack import Epoch
 from tenbaud.replay.refly import Reflown
-from tenbaud.replay.rows import KINDS
 from transmitter.session.copies import Confirmed, Copies
 from transmitter.session.records import write_sample
 

@@ -65,16 +65,21 @@ def load_record(path: Path, other: Path | None = None, *, allow_code: bool = Fal
 
 
 def _agreement(run: Run, tables: Recording, allow_code: bool) -> Agreement:
-    config = run.config.allowing_code() if allow_code else run.config
-    require_allowed(config)
-    config = _with_files_of(run.folder.path, config)
-    require_regular_files(config)
     clock = tables.metadata.get("clock", "")
-    if clock == "real":
-        return agree(config, "real")
-    if clock == "virtual":
-        return agree(config, "virtual")
-    raise RecordingError(f"{tables.path} does not say on which clock it was flown.")
+    if clock not in ("real", "virtual"):
+        raise RecordingError(f"{tables.path} does not say on which clock it was flown.")
+    return agree_again(_with_files_of(run.folder.path, run.config), clock, allow_code)
+
+
+def agree_again(config: FlightConfig, clock: str, allow_code: bool) -> Agreement:
+    """Return the agreement of a flight that was recorded, on the real clock or the virtual one.
+
+    CodeNotAllowed if the configuration names classes from outside, unless `allow_code` permits them.
+    """
+    config = config.allowing_code() if allow_code else config
+    require_allowed(config)
+    require_regular_files(config)
+    return agree(config, "real" if clock == "real" else "virtual")
 
 
 def _with_files_of(folder: Path, config: FlightConfig) -> FlightConfig:

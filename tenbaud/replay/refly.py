@@ -1,19 +1,24 @@
-"""Replay of the receiver's own session: symbols in, states and commands out.
+"""A flight again from its symbols: `refly` by the receiver's own session, symbols in, commands out.
 
 Nothing here knows what was recorded but the words, the state that each epoch starts from and the
 controller. Symbols arrive when they are due, or later by what the caller says; as long as that is
 within their deadlines, it must not matter.
+
+`flown_again` steps the state machine of a narrow downlink with its recorded symbols instead, so that
+nothing needs to be known of the controller. Whether they follow from it is what `refly` answers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.errors import CodecDiverged
 from channel.protocol.frames import Hello, Symbol, Welcome
+from channel.protocol.terms import Terms
 from receiver.controllers.base import Controller
 from receiver.session.session import ReceiverSession
 from tenbaud.build.downlink import with_codec
@@ -131,3 +136,56 @@ def _taken(rows: MemoryRecorder, place: int) -> Iterator[Reflown]:
     for index, (sample, word, _, model, coder, digest, _) in enumerate(samples):
         own: Any = [tuple(row) for row in ticks[index * per_sample : (index + 1) * per_sample]]
         yield Reflown(place, sample, word, model, coder, digest, own, down[index])
+
+
+def flown_again(
+    agreement: Agreement, controller: Controller, epochs: Sequence[Epoch]
+) -> Iterator[Reflown]:
+    """Yield the samples of a flight; where it is narrow the controller gives its set-points only."""
+    machine = agreement.two_way
+    if machine is None:
+        yield from refly(agreement, controller, epochs)
+        return
+    for place, epoch in enumerate(epochs):
+        yield from _stepped(machine, agreement.terms, controller, place, epoch)
+
+
+def _stepped(
+    machine: TwoWay, terms: Terms, controller: Controller, place: int, epoch: Epoch
+) -> Iterator[Reflown]:
+    state = epoch.two_way
+    assert state is not None
+    for word, given in zip(epoch.words, epoch.symbols, strict=True):
+        commands = given[: machine.commands_in(state)]
+        try:
+            both = machine.step(state, word, commands)
+        except (ArithmeticError, ValueError) as error:
+            raise CodecDiverged(f"in sample {state.sample}: {error}") from error
+        hashes = machine.hash_symbols(state, machine.digest(state), commands, word)
+        after = both.state
+        yield Reflown(
+            place,
+            state.sample,
+            word,
+            after.codec.model,
+            after.codec.coder,
+            f"{machine.digest(after):016x}",
+            _ticks(terms, state.sample, controller, zip(both.live, both.commands, strict=True)),
+            (*commands, *hashes),
+            state,
+            both,
+        )
+        state = after
+
+
+def _ticks(
+    terms: Terms, sample: int, controller: Controller, decided: Iterable[tuple[Vector, Vector]]
+) -> list[tuple[int, tuple[float | None, ...], Vector, Vector]]:
+    """Return the ticks that were decided with a sample, as the receiver records them."""
+    first = sample * terms.ticks_per_sample + terms.lead_ticks
+    none = (None,) * len(terms.signals.outputs)
+    found = []
+    for tick, (live, command) in enumerate(decided, first):
+        references = controller.references(tick)
+        found.append((tick, (*references, *none[len(references) :]), live, command))
+    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,8 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.pack import Packed, pack
 from tenbaud.replay.record import FlightRecord, epochs_of
-from tenbaud.replay.refly import Reflown
-from tenbaud.replay.rows import EndRows
-from tenbaud.replay.stepped import flown_again
+from tenbaud.replay.refly import Reflown, flown_again
+from tenbaud.replay.rows import Topic
 from tenbaud.replay.symbols import Unpacked
 
 
@@ -86,12 +85,61 @@ def compare(record: FlightRecord, flown: Sequence[Reflown]) -> tuple[list[str], 
     differences: list[str] = []
     compared = 0
     for end, rows in record.rows.items():
-        found, count = _compare_samples(end, rows, flown)
+        count, unlike = _unlike(
+            rows.topics["sample"],
+            (
+                (
+                    one.sample,
+                    {"word": one.word, "state": one.model, "coder": one.coder, "digest": one.digest},
+                )
+                for one in flown
+            ),
+        )
         compared += count
-        differences += found
+        if unlike:
+            noun = "state differs" if len(unlike) == 1 else "states differ"
+            differences.append(
+                f"{end}: {len(unlike)} {noun} from what the symbols give, first at sample {unlike[0]}"
+            )
     if "receiver" in record.rows:
-        differences += _compare_commands(record.rows["receiver"], flown)
-    return differences + _compare_symbols(record, flown), compared
+        ticks = (tick for one in flown for tick in one.ticks)
+        decided = ((tick, {"command": command, "live_state": live}) for tick, _, live, command in ticks)
+        _, unlike = _unlike(record.rows["receiver"].topics["tick"], decided)
+        if unlike:
+            differences.append(
+                f"receiver: {len(unlike)} commands differ from those of the states, first at tick "
+                f"{unlike[0]}"
+            )
+    down = record.rows[record.consumer].topics[
+        "down_symbols" if record.consumer == "receiver" else "confirmed"
+    ]
+    _, unlike = _unlike(down, ((one.sample, {"symbols": one.symbols}) for one in flown))
+    if unlike:
+        differences.append(
+            f"{record.consumer}: the down symbols of {len(unlike)} sample(s) differ from those of the "
+            f"states, first at sample {unlike[0]}"
+        )
+    return differences, compared
+
+
+def _unlike(topic: Topic, computed: Iterable[tuple[int, dict[str, Any]]]) -> tuple[int, list[str]]:
+    """Return how many rows were compared with what was computed, and those that differ.
+
+    Each of these as its key and the first field that differs, with both values.
+    """
+    rows, compared = topic.by_key(), 0
+    unlike: list[str] = []
+    for key, values in computed:
+        row = rows.get(key)
+        if row is None:
+            continue
+        compared += 1
+        for name, value in values.items():
+            recorded = getattr(row, name)
+            if recorded != value:
+                unlike.append(f"{key}, field {name}: recorded {recorded}, computed {value}")
+                break
+    return compared, unlike
 
 
 def _check_shape(record: FlightRecord) -> None:
@@ -103,71 +151,6 @@ def _check_shape(record: FlightRecord) -> None:
                 f"The {end}'s recording holds data that no node writes: topic {first.topic}, "
                 f"{first.row}, field {first.field}: {first.text}."
             )
-
-
-def _compare_samples(end: str, rows: EndRows, flown: Sequence[Reflown]) -> tuple[list[str], int]:
-    by_sample = rows.topics["sample"].by_key()
-    unlike = 0
-    first = ""
-    compared = 0
-    for one in flown:
-        row = by_sample.get(one.sample)
-        if row is None:
-            continue
-        compared += 1
-        field = _unlike_field(row, one)
-        if field is not None:
-            unlike += 1
-            first = first or f"sample {one.sample}, {field}"
-    if not unlike:
-        return [], compared
-    noun = "state differs" if unlike == 1 else "states differ"
-    return [f"{end}: {unlike} {noun} from what the symbols give, first at {first}"], compared
-
-
-def _unlike_field(row: Any, one: Reflown) -> str | None:
-    """Return the first field in which a recorded sample differs, with both values."""
-    pairs = (
-        ("word", row.word, one.word),
-        ("state", row.state, one.model),
-        ("coder", row.coder, one.coder),
-        ("digest", row.digest, one.digest),
-    )
-    for name, recorded, computed in pairs:
-        if recorded != computed:
-            return f"field {name}: recorded {recorded}, computed {computed}"
-    return None
-
-
-def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
-    by_tick = rows.topics["tick"].by_key()
-    unlike, first = 0, ""
-    for one in flown:
-        for tick, _, live, command in one.ticks:
-            row = by_tick.get(tick)
-            if row is None:
-                continue
-            if row.command != command or row.live_state != live:
-                unlike += 1
-                first = first or f"tick {tick}: recorded {row.command}, computed {command}"
-    if not unlike:
-        return []
-    return [f"receiver: {unlike} commands differ from those of the states, first at {first}"]
-
-
-def _compare_symbols(record: FlightRecord, flown: Sequence[Reflown]) -> list[str]:
-    """Return whether the hash symbols that went down are those of the states."""
-    topic = "down_symbols" if record.consumer == "receiver" else "confirmed"
-    sent = {row.sample: row.symbols for row in record.rows[record.consumer].topics[topic]}
-    unlike = [one for one in flown if one.sample in sent and sent[one.sample] != one.symbols]
-    if not unlike:
-        return []
-    first = unlike[0]
-    return [
-        f"{record.consumer}: the down symbols of {len(unlike)} sample(s) differ from those of the "
-        f"states, first at sample {first.sample}: recorded {sent[first.sample]}, computed "
-        f"{first.symbols}"
-    ]
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:

@@ -7,16 +7,15 @@ import struct
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from channel.codec.codec import ERASED, Vector
-from tenbaud.build.flight import Agreement, agree
+from tenbaud.build.flight import Agreement
 from tenbaud.config.deprecated import with_current_names
-from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.pack import LENGTH, MAGIC, Epoch, width_of
-from tenbaud.replay.record import check_epoch
+from tenbaud.replay.record import agree_again, check_epoch
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +49,7 @@ def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
         (length,) = LENGTH.unpack_from(data, len(MAGIC))
         head: dict[str, Any] = json.loads(_unpacked_head(data[head_at : head_at + length]))
         config = FlightConfig.model_validate(with_current_names(head["config"], "", warn=False))
-        if allow_code:
-            config = config.allowing_code()
-        require_allowed(config)
-        require_regular_files(config)
-        clock: Literal["real", "virtual"] = "real" if head["clock"] == "real" else "virtual"
-        agreement = agree(config, clock)
+        agreement = agree_again(config, head["clock"], allow_code)
         epochs = _epochs(head["epochs"], data[head_at + length :], agreement)
         steps = tuple((int(tick), float(angle)) for tick, angle in head["set_points"])
         for epoch in epochs:

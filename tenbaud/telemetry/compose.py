@@ -72,10 +72,6 @@ class Composer(ABC):
         }
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
 
-    def skip(self, messages: int) -> None:
-        """Count messages that were not sent."""
-        self.skipped += messages
-
     @abstractmethod
     def compose(self) -> dict[str, Any]:
         """Return the message of this moment."""

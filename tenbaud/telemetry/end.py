@@ -123,7 +123,7 @@ class TelemetryEnd:
         told = {
             "telemetry": self.publisher.error or "on",
             "telemetry_sent": self.publisher.sent,
-            "telemetry_dropped": self.publisher.skipped,
+            "telemetry_dropped": self.publisher.composer.skipped,
             "telemetry_rows_dropped": self.tap.dropped,
         }
         if self.queue is not None:

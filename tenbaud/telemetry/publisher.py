@@ -26,16 +26,11 @@ class Publisher:
     def __init__(self, composer: Composer, port: TelemetryPort, rate_hz: float) -> None:
         self.sent = 0
         self.error: str | None = None
-        self._composer = composer
+        self.composer = composer
         self._port = port
         self._period_s = 1.0 / rate_hz
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="telemetry", daemon=True)
-
-    @property
-    def skipped(self) -> int:
-        """Return how many messages were left out."""
-        return self._composer.skipped
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -54,21 +49,21 @@ class Publisher:
             late_s = time.monotonic() - due_s
             if late_s > self._period_s:
                 missed = int(late_s / self._period_s)
-                self._composer.skip(missed)
+                self.composer.skipped += missed
                 due_s += missed * self._period_s
             ending = self._ending.wait(max(0.0, due_s - time.monotonic()))
             self._guard(self._send)
 
     def _send(self) -> None:
         watched = self._port.is_watched()
-        self._composer.tap.watch(watched)
+        self.composer.tap.watch(watched)
         if not watched:
             return
-        message = orjson.dumps(self._composer.compose())
+        message = orjson.dumps(self.composer.compose())
         try:
             self._port.publish(message)
         except LinkError:
-            self._composer.skip(1)
+            self.composer.skipped += 1
         else:
             self.sent += 1
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import secrets
 import socket
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from urllib.parse import urlsplit
@@ -96,16 +96,6 @@ def is_same_origin(headers: Mapping[str, str]) -> bool:
     return site in ("same-origin", "none") or (
         steps_there and headers.get("sec-fetch-dest") == "document"
     )
-
-
-def key_of_cookies(values: Iterable[str]) -> str:
-    """Return the secret among the `Cookie` headers of a request, "" when there is none."""
-    for value in values:
-        for part in value.split(";"):
-            name, _, key = part.strip().partition("=")
-            if name == COOKIE:
-                return key
-    return ""
 
 
 def _is_address(name: str) -> bool:

@@ -41,10 +41,12 @@ class Board:
         self.flight = 0
         self.foreign = 0
         """messages that were no telemetry of this version"""
-        self._points: deque[list[Any]] = deque(maxlen=POINTS_KEPT)
-        self._decisions: deque[list[Any]] = deque(maxlen=POINTS_KEPT)
+        self._kept: dict[str, deque[Any]] = {
+            "points": deque(maxlen=POINTS_KEPT),
+            "decisions": deque(maxlen=POINTS_KEPT),
+            "events": deque(maxlen=EVENTS_KEPT),
+        }
         self._samples: dict[int, list[Any]] = {}
-        self._events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self._news: deque[News] = deque(maxlen=NEWS_KEPT)
         self._index = 0
         self._fresh = self._nothing()
@@ -93,10 +95,8 @@ class Board:
             self._on_receiver(message)
         for event in message["events"]:
             row = {"role": role, **event, "text": events.event_text(event)}
-            if not is_shown(row):
-                continue
-            self._events.append(row)
-            self._fresh["events"].append(row)
+            if is_shown(row):
+                self._keep("events", row)
 
     def _turns_to(self, flight: int, now_s: float) -> bool:
         """Return whether to show this flight now, instead of the one shown so far."""
@@ -109,17 +109,16 @@ class Board:
         self.flight = flight
         self.heads.clear()
         self.heard_s.clear()
-        for memory in (self._points, self._decisions, self._samples, self._events):
-            memory.clear()
+        self._samples.clear()
+        for kept in self._kept.values():
+            kept.clear()
         self._fresh = {**self._nothing(), "reset": True}
         return True
 
     def _on_transmitter(self, message: dict[str, Any]) -> None:
         for point in message["points"]:
             values = point["measured"] if point["true"] is None else point["true"]
-            row = [point["time_s"], values, point["coded"], point["range"]]
-            self._points.append(row)
-            self._fresh["points"].append(row)
+            self._keep("points", [point["time_s"], values, point["coded"], point["range"]])
         for sample in message["samples"]:
             kept = self._sample(sample["sample"])
             kept[1], kept[2] = sample["word_sent"], sample["word"]
@@ -129,15 +128,17 @@ class Board:
 
     def _on_receiver(self, message: dict[str, Any]) -> None:
         for point in message["points"]:
-            row = [point["time_s"], point["reference"]]
-            self._decisions.append(row)
-            self._fresh["decisions"].append(row)
+            self._keep("decisions", [point["time_s"], point["reference"]])
         for sample in message["samples"]:
             kept = self._sample(sample["sample"])
             kept[2] = sample["word"]
             # What came over the line is compared, where it is known already.
             if kept[3] is None or not kept[4]:
                 kept[4] = sample["digest"]
+
+    def _keep(self, name: str, row: Any) -> None:
+        self._kept[name].append(row)
+        self._fresh[name].append(row)
 
     def _sample(self, number: int) -> list[Any]:
         """Return the memory of a sample: number, word sent, word taken, both digests, outputs."""
@@ -150,16 +151,9 @@ class Board:
         return kept
 
     def _everything(self) -> bytes:
-        return orjson.dumps(
-            {
-                "reset": True,
-                "heads": self.heads,
-                "points": list(self._points),
-                "decisions": list(self._decisions),
-                "samples": list(self._samples.values()),
-                "events": list(self._events),
-            }
-        )
+        lists = {name: list(kept) for name, kept in self._kept.items()}
+        lists["samples"] = list(self._samples.values())
+        return orjson.dumps({"reset": True, "heads": self.heads, **lists})
 
     @staticmethod
     def _nothing() -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Self
 
@@ -69,31 +68,17 @@ class Feed:
                 feed.close()
 
     def _look(self) -> None:
+        from channel.links.zenoh.telemetry import TelemetryFeed
+
         for endpoint in [one for one, feed in self._open.items() if not feed.is_connected]:
             self._open.pop(endpoint).close()
-        for endpoint in self._wanted():
+        endpoints = self._endpoints
+        if not endpoints:
+            with suppress(LinkError):  # this user has no folder for flights
+                endpoints = tuple(found_endpoints())
+        for endpoint in endpoints:
             if endpoint not in self._open and not self._ending.is_set():
-                opened = _try_open(
-                    endpoint, self._session_name, self._messages.append, self._credentials
-                )
-                if opened is not None:
-                    self._open[endpoint] = opened
-
-    def _wanted(self) -> tuple[str, ...]:
-        if self._endpoints:
-            return self._endpoints
-        try:
-            return tuple(found_endpoints())
-        except LinkError:
-            return ()
-
-
-def _try_open(
-    endpoint: str, session_name: str, take: Callable[[bytes], None], credentials: Credentials | None
-) -> Any:
-    from channel.links.zenoh.telemetry import TelemetryFeed
-
-    try:
-        return TelemetryFeed(endpoint, session_name, take, credentials)
-    except LinkError:
-        return None  # nobody there yet, or any more
+                with suppress(LinkError):  # nobody there yet, or any more
+                    self._open[endpoint] = TelemetryFeed(
+                        endpoint, self._session_name, self._messages.append, self._credentials
+                    )

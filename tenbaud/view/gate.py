@@ -8,12 +8,12 @@ belongs to its path.
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs
+from typing import TYPE_CHECKING
 
-from tenbaud.view.access import Access, Grant, is_same_origin, key_of_cookies
+from tenbaud.view.access import COOKIE, Access, Grant, is_same_origin
 
 if TYPE_CHECKING:
+    from starlette.responses import HTMLResponse
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 GRANT = "tenbaud.grant"
@@ -56,17 +56,19 @@ class Gate:
         headers = _headers(scope)
         refusal = self._refusal(scope, headers)
         if refusal:
-            await _answer(scope, send, 403, PAGE.format(head="", body=f"<p>{refusal}</p>"))
+            await _page("", f"<p>{refusal}</p>", 403)(scope, receive, _with_headers(send))
         elif (grant := self._entering(scope)) is not None:
             # Not a redirect: after one, browsers that came from another site withhold a strict cookie.
             head = f'<meta http-equiv="refresh" content="0; url={grant.path}/">'
-            await _answer(scope, send, 200, PAGE.format(head=head, body=""), grant.cookie)
+            answer = _page(head, "", 200)
+            answer.headers["set-cookie"] = grant.cookie
+            await answer(scope, receive, _with_headers(send))
         elif (grant := self._holder(scope, headers)) is not None:
             # Everything is served below the grant's path, so that the cookie goes nowhere else.
             inner = {**scope, "root_path": grant.path, GRANT: grant}
             await self.app(inner, receive, _with_headers(send))
         else:
-            await _answer(scope, send, 403, PAGE.format(head="", body=f"<p>{NO_SECRET}</p>"))
+            await _page("", f"<p>{NO_SECRET}</p>", 403)(scope, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> str:
         """Return why this request comes from the wrong place; "" when it does not."""
@@ -83,15 +85,19 @@ class Gate:
 
     def _entering(self, scope: Scope) -> Grant | None:
         """Return what the secret in a printed address allows; None when this is no such address."""
+        from starlette.datastructures import QueryParams
+
         if scope["type"] != "http" or scope["path"] != "/" or scope["method"] not in SAFE_METHODS:
             return None
-        return self._access.holder_of(_key(scope))
+        return self._access.holder_of(QueryParams(scope["query_string"]).get("key", ""))
 
     def _holder(self, scope: Scope, headers: dict[str, str]) -> Grant | None:
         """Return what the cookie of a request allows, at its path; None: nothing."""
         grant = self._access.below(scope["path"])
-        key = key_of_cookies([headers.get("cookie", "")])
-        return grant if grant is not None and grant.accepts(key) else None
+        # Another server of this host name may have set a cookie of the same name.
+        cookies = (part.strip().partition("=") for part in headers.get("cookie", "").split(";"))
+        keys = [key for name, _, key in cookies if name == COOKIE]
+        return grant if grant is not None and any(map(grant.accepts, keys)) else None
 
 
 def _headers(scope: Scope) -> dict[str, str]:
@@ -104,14 +110,6 @@ def _headers(scope: Scope) -> dict[str, str]:
     return found
 
 
-def _key(scope: Scope) -> str:
-    try:
-        query: dict[str, list[str]] = parse_qs(scope["query_string"].decode("ascii"), max_num_fields=8)
-    except ValueError:
-        return ""
-    return query.get("key", [""])[0]
-
-
 def _with_headers(send: Send) -> Send:
     async def sending(message: Message) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
@@ -121,18 +119,8 @@ def _with_headers(send: Send) -> Send:
     return sending
 
 
-async def _answer(scope: Scope, send: Send, status: int, text: str, cookie: str = "") -> None:
-    """Answer with a small page of our own; a WebSocket that is asked for is refused with it."""
-    kind = "http" if scope["type"] == "http" else "websocket.http"
-    body = text.encode()
-    headers: list[tuple[bytes, bytes]] = [
-        (b"content-type", b"text/html; charset=utf-8"),
-        (b"content-length", str(len(body)).encode()),
-        (b"cache-control", b"no-store"),
-        *HEADERS,
-    ]
-    if cookie:
-        headers.append((b"set-cookie", cookie.encode()))
-    start: dict[str, Any] = {"type": f"{kind}.response.start", "status": status, "headers": headers}
-    await send(start)
-    await send({"type": f"{kind}.response.body", "body": body})
+def _page(head: str, body: str, status: int) -> HTMLResponse:
+    """Return a small page of our own; a WebSocket that is asked for is refused with it."""
+    from starlette.responses import HTMLResponse
+
+    return HTMLResponse(PAGE.format(head=head, body=body), status, {"cache-control": "no-store"})

@@ -20,7 +20,7 @@ from channel.errors import TenbaudError
 from tenbaud.recording.envelope import extremes
 from tenbaud.recording.run import Run
 from tenbaud.recording.signals import Source
-from tenbaud.recording.table import Series, Table
+from tenbaud.recording.table import Series
 from tenbaud.telemetry.common import OF_TRANSMITTER, is_shown, named_signal
 from tenbaud.view.board import EVENTS_KEPT, SAMPLES_KEPT
 from tenbaud.view.samples import RATE_SPAN_S, SAMPLE_FIELDS, RecordedSamples
@@ -61,10 +61,7 @@ class RecordedFlight:
             run.tables(end).read(COLUMNS[end])
         up, down = (run.tables(end) if end in run.ends else None for end in COLUMNS)
         self._has = {end: end in run.ends for end in COLUMNS}
-        self._ticks = up.topics.get("tick") if up else None
-        self._gap = up.topics.get("gap") if up else None
-        self._listed = up.topics.get("hypotheses") if up else None
-        self._came_down = up.topics.get("down_symbols") if up else None
+        self._tables = up.topics if up else {}
         self.base = run.base
         self._source = Source(self.base, up, down)
         self.samples = RecordedSamples(up, down)
@@ -101,7 +98,7 @@ class RecordedFlight:
             return "the transmitter's recording is not here"
         if self.samples.compared:
             return ""
-        if self._listed is not None and not self._has["receiver"]:
+        if "hypotheses" in self._tables and not self._has["receiver"]:
             return "no digest comes down, and the receiver's recording is not here"
         return "no digests were recorded"
 
@@ -213,14 +210,15 @@ class RecordedFlight:
         heads = {}
         if self._has["transmitter"]:
             period_s = self.sample_s / self.samples.symbols_per_word
+            gap = float(self._row("gap", sample).get("rms_over_floor", math.nan))
             heads["transmitter"] = common | {
                 "clock": self.run.metadata.get("clock", ""),
                 "symbol_period_s": period_s,
                 "baud_configured": self.run.summary.get("baud_configured") or 1.0 / period_s,
-                "guard": self._text_at("guard", tick),
+                "guard": str(self._row("tick", int(self.base.ticks[tick])).get("guard", "")),
                 "applied": self._applied[tick].tolist(),
                 "lateness": self._lateness(tick),
-                "gap_to_floor": self._gap_at(sample),
+                "gap_to_floor": None if math.isnan(gap) else gap,
                 "narrow": self._narrow_at(sample),
             }
         if self._has["receiver"]:
@@ -235,10 +233,14 @@ class RecordedFlight:
             "inputs": _named(self.plant.inputs, self._applied),
         }
 
-    def _text_at(self, name: str, tick: int) -> str:
-        table = self._ticks
-        row = _row_of(table, int(self.base.ticks[tick]))
-        return "" if table is None or row is None or name not in table.names else str(table[name][row])
+    def _row(self, topic: str, key: int) -> dict[str, Any]:
+        """Return the transmitter's last row of a topic up to a tick or sample; {} without one."""
+        table = self._tables.get(topic)
+        row = -1 if table is None else int(np.searchsorted(table.keys, key, side="right")) - 1
+        if table is None or row < 0:
+            return {}
+        names = COLUMNS["transmitter"][topic]
+        return {name: table[name][row] for name in names if name in table.names}
 
     def _lateness(self, tick: int) -> dict[str, float] | None:
         late = self._source.loop("lateness_ms") if self.run.metadata.get("clock") == "real" else None
@@ -253,12 +255,14 @@ class RecordedFlight:
 
     def _narrow_at(self, sample: int) -> dict[str, Any] | None:
         """Return what the transmitter knew of the receiver's state once it had heard of a sample."""
-        row = _row_of(self._listed, sample)
-        if self._listed is None or row is None:
+        row = self._row("hypotheses", sample)
+        if not row:
             return None
-        names = {"confirmed_to": int, "size": int, "rest": float}
-        return {name: of(self._listed[name][row]) for name, of in names.items()} | {
+        return {
             "sample": sample,
+            "confirmed_to": int(row["confirmed_to"]),
+            "size": int(row["size"]),
+            "rest": float(row["rest"]),
             "hash_symbols": None,
             "baud_measured": self._down_rate_at(sample),
             "baud_configured": self._shared["channel"]["downlink_baud"],
@@ -267,19 +271,12 @@ class RecordedFlight:
 
     def _down_rate_at(self, sample: int) -> float | None:
         """Return the down symbols per second that came in the last 5 s of flight time."""
-        table, rows = self._came_down, round(RATE_SPAN_S / self.sample_s)
+        table, rows = self._tables.get("down_symbols"), round(RATE_SPAN_S / self.sample_s)
         if table is None:
             return None
         last = int(np.searchsorted(table.keys, sample, side="right"))
         came = ~np.isnan(table["symbols"][max(0, last - rows) : last])
         return float(came.sum()) / (len(came) * self.sample_s) if len(came) else None
-
-    def _gap_at(self, sample: int) -> float | None:
-        row = _row_of(self._gap, sample)
-        found = (
-            math.nan if self._gap is None or row is None else float(self._gap["rms_over_floor"][row])
-        )
-        return None if math.isnan(found) else found
 
 
 def _named(signals: Sequence[Signal], values: Series) -> list[dict[str, Any]]:
@@ -290,14 +287,6 @@ def _named(signals: Sequence[Signal], values: Series) -> list[dict[str, Any]]:
             one["high"] = float(np.nanmax(np.abs(column)))
             one["low"] = -one["high"]
     return named
-
-
-def _row_of(table: Table | None, key: int) -> int | None:
-    """Return the last row up to a tick or sample."""
-    if table is None or not len(table):
-        return None
-    row = int(np.searchsorted(table.keys, key, side="right")) - 1
-    return row if row >= 0 else None
 
 
 def _rows(times: Series, *columns: Series) -> list[Any]:

@@ -27,7 +27,7 @@ def serve_recorded(
 ) -> None:
     """Serve the page until the process is asked to stop. Raises PageUnavailable."""
     require_nicegui()
-    address.check()
+    address = address.checked()
     from starlette.applications import Starlette
     from starlette.responses import HTMLResponse
     from starlette.routing import Mount, Route, WebSocketRoute
@@ -55,32 +55,15 @@ def serve_recorded(
         except (ValueError, TypeError, KeyError):  # KeyError: bytes instead of text
             await browser.close(1003)  # no question of the page's script
 
-    ready: list[Any] = []
     app = Starlette(
         routes=[
             Route("/", page),
             Mount("/view", StaticFiles(directory=STATIC)),
             WebSocketRoute("/stream", stream),
-        ],
-        lifespan=_starting(ready),
+        ]
     )
     access = draw_access(address.host, address.is_local, view_only=True)
-    run_page(app, access, address, open_browser=open_browser, on_startup=ready.append)
-
-
-def _starting(ready: list[Any]) -> Any:
-    """Return a lifespan that starts what is `ready` when the server does."""
-    import asyncio
-    from contextlib import asynccontextmanager
-
-    @asynccontextmanager
-    async def lifespan(_: Any) -> Any:
-        tasks = [asyncio.create_task(one()) for one in ready]
-        yield
-        for task in tasks:
-            task.cancel()
-
-    return lifespan
+    run_page(app, access, address, open_browser=open_browser)
 
 
 def described(flights: list[RecordedFlight]) -> dict[str, Any]:

@@ -11,9 +11,9 @@ import asyncio
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import Any
 from urllib.request import Request, urlopen
@@ -63,8 +63,11 @@ class Address:
         host = EVERYWHERE.get(self.host, self.host)
         return f"[{host}]" if ":" in host else host
 
-    def check(self) -> None:
-        """Refuse an address that is taken, or that others can reach unless that is allowed."""
+    def checked(self) -> Address:
+        """Return the address with a port that is free, any one for port 0.
+
+        Raises PageUnavailable for one that is taken, or that others can reach unless that is allowed.
+        """
         if not self.is_local and not self.insecure:
             raise PageUnavailable(
                 f"{self.host} is reachable from other machines, and the page is not encrypted: whoever "
@@ -72,9 +75,10 @@ class Address:
                 "commands. On a network that you trust with that, add --insecure"
             )
         try:
-            with _socket_for(self.host) as probe:
+            with socket.socket(socket.AF_INET6 if ":" in self.host else socket.AF_INET) as probe:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind((self.host, self.port))
+                return replace(self, port=probe.getsockname()[1])
         except OSError as error:
             raise PageUnavailable(
                 f"the page cannot be served at {self.name}:{self.port}: {error.strerror}; give another "
@@ -103,7 +107,7 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
     `view_only`: no address is printed that lets anybody steer.
     """
     require_nicegui()
-    address.check()
+    address = address.checked()
     from fastapi import FastAPI
     from nicegui import app, ui
 
@@ -128,17 +132,10 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
         reconnect_timeout=5.0,
     )
     with feed:
-        run_page(outer, access, address, open_browser=open_browser, on_startup=app.on_startup)
+        run_page(outer, access, address, open_browser=open_browser)
 
 
-def run_page(
-    inner: Any,
-    access: Access,
-    address: Address,
-    *,
-    open_browser: bool,
-    on_startup: Callable[[Callable[[], Any]], None],
-) -> None:
+def run_page(inner: Any, access: Access, address: Address, *, open_browser: bool) -> None:
     """Serve an application behind the gate until the process is asked to stop."""
     import uvicorn
 
@@ -158,8 +155,15 @@ def run_page(
     )
     with ExitStack() as stack:
         shown = stack.enter_context(open_privately()) if open_browser else None
-        on_startup(lambda: _first_look(address.url, access, shown))
-        uvicorn.Server(config).run()
+        asyncio.run(_serve(uvicorn.Server(config), _first_look(address.url, access, shown)))
+
+
+async def _serve(server: Any, first_look: Coroutine[Any, Any, None]) -> None:
+    looking = asyncio.create_task(first_look)
+    try:
+        await server.serve()
+    finally:
+        looking.cancel()
 
 
 def _add_stream(app: Any, feed: Feed, board: Board) -> None:
@@ -216,15 +220,3 @@ async def _first_look(url: str, access: Access, shown: Callable[[str], None] | N
     sys.stderr.flush()
     if shown is not None:
         await asyncio.to_thread(shown, first.address(url))
-
-
-def _socket_for(host: str) -> socket.socket:
-    """Return a socket that takes this host's kind of address."""
-    return socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
-
-
-def free_port(host: str) -> int:
-    """Return a port that was free at this address a moment ago."""
-    with _socket_for(host) as probe:
-        probe.bind((host, 0))
-        return int(probe.getsockname()[1])

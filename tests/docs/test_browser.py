@@ -19,7 +19,7 @@ from docs.browser.flight import BrowserFlight, FlightParts
 from docs.tools import browser as page
 from tenbaud.cli.commands import app
 from tenbaud.replay.control import controller_of
-from tenbaud.replay.stepped import flown_again
+from tenbaud.replay.refly import flown_again
 from tenbaud.replay.symbols import unpack
 
 WHY = why_no_browser() or page.why_no_pyodide()

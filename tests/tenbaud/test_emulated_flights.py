@@ -15,7 +15,7 @@ from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.summary import transmitter_part
-from tenbaud.recording.reader import MessageStream
+from tenbaud.recording.reader import Recording
 from tests.tenbaud.confirmed import check_flown, need_idle
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 from tests.tenbaud.ends import wait_for
@@ -157,5 +157,5 @@ def test_the_rigs_watchdog_never_trips(tmp_path: Path) -> None:
 
 
 def _last_tick(folder: Path) -> dict[str, object]:
-    rows = [row for _, _, row in MessageStream(folder / "transmitter.mcap", "tick")]
+    rows = [row for _, row in Recording(folder / "transmitter.mcap").rows("tick")]
     return rows[-1]

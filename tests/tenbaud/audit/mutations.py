@@ -17,9 +17,9 @@ from mcap.writer import CompressionType, Writer
 
 from tenbaud.audit.base import FILED
 from tenbaud.recording.encoding import channel_schema
+from tenbaud.recording.kinds import KINDS
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.writer import END_METADATA, RUN_METADATA
-from tenbaud.replay.rows import KINDS
 
 Message = tuple[str, int, dict[str, Any]]
 

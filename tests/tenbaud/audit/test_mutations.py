@@ -14,10 +14,11 @@ from tenbaud.audit.audit import Audit, audit, audit_record
 from tenbaud.audit.base import FILED, Evidence
 from tenbaud.audit.table import CLAIMS
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.kinds import KINDS
 from tenbaud.recording.reader import Recording
 from tenbaud.replay.record import FlightRecord, load_record
 from tenbaud.replay.replay import replay
-from tenbaud.replay.rows import KINDS, read_rows
+from tenbaud.replay.rows import read_rows
 from tests.tenbaud.audit.mutations import Mutation, Original, write_recording
 from tests.tenbaud.audit.unclaimed import ORDER, UNCLAIMED, reason_for
 from tests.tenbaud.flown import flown

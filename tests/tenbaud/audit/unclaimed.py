@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from tenbaud.audit.base import FILED, Evidence
-from tenbaud.replay.rows import KINDS
+from tenbaud.recording.kinds import KINDS
 
 ORDER = "(order)"
 """The place of a row among the others of its topic, as if it were a field."""

@@ -23,7 +23,7 @@ def written(chunk_bytes: int = 4096, messages: list[tuple[int, int, bytes]] = ME
     writer.start("tenbaud", "test")
     writer.add_metadata("run", {"seed": "7"})
     for topic in ("tick", "sample"):
-        writer.register_channel(topic, "json", writer.register_schema(topic, "jsonschema", b"{}"))
+        writer.register(topic, b"{}")
     for message in messages:
         writer.add_message(*message)
     writer.add_metadata("recorder", {"rows_written": str(len(messages))})

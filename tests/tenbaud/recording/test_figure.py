@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from tenbaud import fly as fly_once
+from tenbaud.flight.report import draw_figure
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.figure import draw_flight
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.recording.rows import EVENT, Rows
 
@@ -17,7 +17,9 @@ def test_figure_is_a_png_of_sensible_size(
     tmp_path: Path, fly: Callable[..., Path], ticks: int, with_receiver: bool
 ) -> None:
     run = RunFolder(fly(tmp_path / "run", ticks, erased=(7, 8, 40)))
-    draw_flight(run.transmitter, run.receiver if with_receiver else None, run.figure, "a flight")
+    if not with_receiver:
+        run.receiver.unlink()
+    draw_figure(run, "a flight")
     picture = run.figure.read_bytes()
     assert picture.startswith(b"\x89PNG\r\n\x1a\n")
     width, height = (int.from_bytes(picture[at : at + 4], "big") for at in (16, 20))
@@ -28,10 +30,11 @@ def test_figure_is_a_png_of_sensible_size(
 def test_recording_without_ticks_is_refused(
     tmp_path: Path, record: Callable[[Path, Rows], Path]
 ) -> None:
-    path = record(tmp_path / "a.mcap", [(EVENT, 0, (0.0, "start", None, ""))])
+    run = RunFolder(tmp_path)
+    record(run.transmitter, [(EVENT, 0, (0.0, "start", None, ""))])
     with pytest.raises(RecordingError, match="holds no ticks"):
-        draw_flight(path, None, tmp_path / "a.png", "")
-    assert not (tmp_path / "a.png").exists()
+        draw_figure(run, "")
+    assert not run.figure.exists()
 
 
 @pytest.mark.parametrize(

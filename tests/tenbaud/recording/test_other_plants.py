@@ -104,7 +104,7 @@ def test_the_figure_of_many_bits_shows_the_share_that_was_about_each_output(run:
         "about": [[0], [0], [0], [1]] * 400,
     }
     overview = Overview(run.plant)
-    overview.add("sample", [at * 100_000_000 for at in range(1600)], rows.get)
+    overview.add("sample", [at * 100_000_000 for at in range(1600)], rows)
     stored = unpacked(packed(overview), run.plant)
     assert stored is not None
     for one in (overview, stored):

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.browser import served
-from tenbaud.view.server import free_port
+from tenbaud.view.server import Address
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.view.viewers import beside, is_free, needs_page
 
@@ -53,7 +53,7 @@ def wait_until(true: Callable[[], object], what: str, timeout_s: float = 60.0) -
 def test_ctrl_c_at_any_moment_ends_the_viewer_and_frees_its_port(
     tmp_path: Path, moment_s: float
 ) -> None:
-    port = free_port("127.0.0.1")
+    port = Address(port=0).checked().port
     process = start("demo", "--view", "--view-port", str(port), "--out", "run", cwd=tmp_path)
     time.sleep(moment_s)
     process.send_signal(signal.SIGINT)
@@ -67,7 +67,7 @@ def test_ctrl_c_at_any_moment_ends_the_viewer_and_frees_its_port(
 def test_a_signal_while_the_page_is_starting_ends_its_process(
     tmp_path: Path, how: signal.Signals
 ) -> None:
-    port = free_port("127.0.0.1")
+    port = Address(port=0).checked().port
     # A folder of its own for what is temporary; a short one, for there will be sockets in it.
     with tempfile.TemporaryDirectory(prefix="tb") as own:
         arguments = ("demo", "--view", "--view-port", str(port), "--out", "run")

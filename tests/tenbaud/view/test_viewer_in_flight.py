@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tenbaud.view.server import free_port
+from tenbaud.view.server import Address
 from tests.tenbaud.confirmed import PATIENT, check_flown
 from tests.tenbaud.machine import Pacer
 from tests.tenbaud.processes import finish, start
@@ -69,7 +69,7 @@ def slow(viewer: int) -> Iterator[None]:
 def test_a_viewer_in_trouble_does_not_hold_the_flight_up(
     tmp_path: Path, trouble: contextlib.AbstractContextManager[None]
 ) -> None:
-    port = free_port("127.0.0.1")
+    port = Address(port=0).checked().port
     arguments = ("--view-port", str(port), "--clock", "real", "--duration", str(DURATION_S))
     process = start("demo", "--view", *arguments, *PATIENT, "--out", "run", cwd=tmp_path)
     _wait_until_flying(tmp_path / "run" / "transmitter.mcap")

@@ -192,8 +192,14 @@ def _is_on(point: Point, line: dict[str, float]) -> bool:
     return all(getattr(point, name) == line.get(name, 0) for name in ("loss", "flip", "trip"))
 
 
+COLUMNS = """\
+Error, tracking and largest error are over those of `full`. *Confirmed after* is in samples, *list* the
+mean number of hypotheses, and *applied off* the rms of the inputs as applied less those that the
+receiver's state commands."""
+
+
 def _all(found: Points) -> str:
-    rows = ["## All points", ""]
+    rows = ["## All points", "", COLUMNS, ""]
     for subject in SUBJECTS:
         for scheme, name in NAMES.items():
             points = [one for one in found if _is_of(one, subject, scheme)]

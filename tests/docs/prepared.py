@@ -3,8 +3,8 @@
 A page types in a dozen commands, and each would spend most of its time on imports. Here one process has
 imported the libraries; a copy of it (`fork`) imports the project as a page's folder has it, and each
 command of that page is a copy of this copy. `tenbaud` and `python -c` in that folder are small programs
-that ask for a copy, pass it their streams, forward signals, and end as it ended. The long tests and the
-README start ordinary processes.
+that ask for a copy, pass it their streams, forward signals, and end as it ended. The long tests and
+what `make` starts are ordinary processes.
 """
 
 from __future__ import annotations

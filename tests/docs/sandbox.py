@@ -3,12 +3,13 @@
 The commands stand in the pages as people type them. What makes them safe to run in a test is here:
 the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
 that `make` would build is there already, and the home folder is an empty one; what was compiled for
-studies is shared. pytest only collects in
-it, one folder with tests of both halves: the tests that type in `make test` must not run themselves.
+studies is shared. pytest only collects in it, and two files of tests alone: the tests that type in
+`make test` must not run themselves.
 """
 
 from __future__ import annotations
 
+import fnmatch
 import os
 import re
 import shlex
@@ -29,7 +30,8 @@ from tests.rules.sources import TOP
 LEFT_OUT = (".git", ".venv", "*.egg-info", ".cache", ".*_cache", ".hypothesis")
 LEFT_OUT_AT_TOP = {"runs", "site", "dist", "build"}
 """Left out of the top folder only: `tenbaud/build` is a package."""
-COLLECTED = "tests/transmitter/loops"
+COLLECTED = ("tests/transmitter/test_guard.py", "tests/transmitter/test_overload.py")
+"""Tests of both halves of `make test`."""
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
@@ -151,7 +153,7 @@ class Sandbox:
             "MPLCONFIGDIR": matplotlib.get_configdir(),
             "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")),
             "COLUMNS": "200",
-            "PYTEST_ADDOPTS": f"--collect-only {COLLECTED}",
+            "PYTEST_ADDOPTS": " ".join(["--collect-only", *COLLECTED]),
             "NO_COLOR": "1",
         }
 
@@ -181,15 +183,10 @@ class Sandbox:
 
     def _left_out(self, folder: str, names: list[str]) -> set[str]:
         """Return which entries of a folder are not copied."""
-        patterns = list(LEFT_OUT)
-        if (
-            self.copies
-            and Path(folder).is_relative_to(TOP / "tests")
-            and folder != str(TOP / COLLECTED)
-        ):
-            patterns.append("test_*.py")  # nothing collects or reads them
+        unread = set(fnmatch.filter(names, "test_*.py")) if self.copies else set()
+        unread = {name for name in unread if not f"{folder}/{name}".endswith(COLLECTED)}
         at_top = LEFT_OUT_AT_TOP & set(names) if Path(folder) == TOP else set()
-        return shutil.ignore_patterns(*patterns)(folder, names) | at_top
+        return shutil.ignore_patterns(*LEFT_OUT)(folder, names) | at_top | unread
 
     def _free_port(self, match: re.Match[str]) -> str:
         port = match[0]

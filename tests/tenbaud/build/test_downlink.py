@@ -215,11 +215,11 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
         ({"receiver__reference": {"kind": "none"}}, "no output has a set-point"),
         (
             {"downlink__directions": [[0.5, -0.5]], "downlink__range_max": 0.7},
-            r'downlink\.directions, downlink\.range_max: only for the scheme "coded", .* leave it out',
+            r'downlink\.directions, downlink\.range_max: only for the scheme "coded"; .* leave it out',
         ),
         (
             {"downlink__scheme": "coded", "downlink__bits": 8},
-            r'downlink\.bits: only for the scheme "mirrored", .* set downlink\.scheme = "mirrored"',
+            r'downlink\.bits: only for the scheme "mirrored"; .* set downlink\.scheme = "mirrored"',
         ),
         ({"timing__lead_ticks": 7, "downlink__scheme": "coded"}, "need lead_ticks >= 8"),
         ({"downlink__scheme": "coded", "downlink__directions": [[1.0]]}, r"1 row\(s\) of 1 numbers"),

@@ -38,6 +38,9 @@ COMPILED_ONCE = (
 )
 """Their tests stay together: the first compiles a flight, the others read its machine code."""
 
+DESIGNED_ONCE = ("tests/tenbaud/flight/test_systems.py", "tests/tenbaud/flight/test_refused_systems.py")
+"""Each stays on one worker: the coder of a plant is designed once in a process."""
+
 LONGEST_FIRST = (
     *COMPILED_ONCE,
     "tests/docs/",
@@ -106,7 +109,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
                 return COMPILED_ONCE[0]
             if nodeid.startswith(PAGES) and not nodeid.endswith(COMPILED_BEFORE):
                 return f"{PAGES}{nodeid.count('/') % 2}"
-            return file if _has_shared_fixture(config.rootpath / file) else nodeid
+            together = file in DESIGNED_ONCE or _has_shared_fixture(config.rootpath / file)
+            return file if together else nodeid
 
     return ByFixture(config, log)
 

@@ -47,7 +47,7 @@ def floors_table() -> str:
             _degrees(floor(double, rate)),
             _degrees(floor(body, rate)),
             _degrees(word_floor(body, 1.0, 1.0 / rate)),
-            _degrees(floor(body, rate, erased=0.3)),
+            _degrees(floor(body, 0.7 * rate)),
             _degrees(floor_behind_encoder(NOMINAL, rate, RIG_COUNTS, tick_of(rate))),
         )
         for rate in RATES

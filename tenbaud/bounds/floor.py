@@ -38,20 +38,20 @@ class RateTooLow(ValueError):
     """A rate at which no code can follow the plant; the text says which one can."""
 
 
-def floor(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> float:
+def floor(model: LinearModel, rate_bit_s: float) -> float:
     """Return the least mean square error at R bit/s: that of the outputs, by their weights.
 
-    `erased` is the fraction of the bits that are lost, and known by both ends to be lost: the floor is
-    that of `(1 - erased) R`, the capacity of the erasure channel with feedback.
+    Where a share of the bits is lost, and known by both ends to be lost, R is the rate of the others:
+    the capacity of the erasure channel with feedback.
     """
-    return float(np.sum(model.cost * floor_covariance(model, rate_bit_s, erased)))
+    return float(np.sum(model.cost * floor_covariance(model, rate_bit_s)))
 
 
-def floor_covariance(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> Matrix:
+def floor_covariance(model: LinearModel, rate_bit_s: float) -> Matrix:
     """Return the covariance P of the errors whose weighted mean square is least."""
     matrices = (np.asarray(one, float) for one in (model.dynamics, model.noise, model.cost))
-    paid = _paid(model, rate_bit_s, erased)
-    return _floor_covariance(tuple(one.tobytes() for one in matrices), paid).copy()
+    _check_rate(model, rate_bit_s)
+    return _floor_covariance(tuple(one.tobytes() for one in matrices), rate_bit_s).copy()
 
 
 @lru_cache(maxsize=64)
@@ -90,13 +90,13 @@ def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
     return scaled.back(covariance), worth / np.outer(scaled.sizes, scaled.sizes)
 
 
-def word_floor(model: LinearModel, bits: float, period_s: float, erased: float = 0.0) -> float:
+def word_floor(model: LinearModel, bits: float, period_s: float) -> float:
     """Return the least mean square error, over time, with a word of `bits` bits every `period_s`.
 
-    The word is there at the instant of its sample. A word lost with probability `erased` counts for
-    `1 - erased` of its bits.
+    The word is there at the instant of its sample.
     """
-    scaled = _Scaled(model, _paid(model, bits / period_s, erased))
+    _check_rate(model, bits / period_s)
+    scaled = _Scaled(model, bits / period_s)
     period = scaled.speed * period_s
     problem = _Words(scaled.model, period)
     nats = scaled.rate_nats * period
@@ -104,20 +104,16 @@ def word_floor(model: LinearModel, bits: float, period_s: float, erased: float =
     return scaled.unit * (float(np.sum(problem.cost * covariance)) + problem.between)
 
 
-def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
-    """Return the rate that arrives; RateTooLow where it cannot hold the plant."""
+def _check_rate(model: LinearModel, rate_bit_s: float) -> None:
+    """Raise ValueError for what is no rate, RateTooLow for one that cannot hold the plant."""
     if not (math.isfinite(rate_bit_s) and rate_bit_s > 0.0):
         raise ValueError(f"the rate is {rate_bit_s} bit/s; it must be above 0")
-    if not 0.0 <= erased < 1.0:
-        raise ValueError(f"the erased fraction is {erased}; it must be at least 0 and below 1")
-    require_rate(model.dynamics, rate_bit_s, erased)
-    return rate_bit_s * (1.0 - erased)
+    require_rate(model.dynamics, rate_bit_s)
 
 
 def require_rate(
     dynamics: Matrix,
     rate_bit_s: float,
-    erased: float = 0.0,
     *,
     states: Sequence[str] = (),
     advice: str = "",
@@ -127,8 +123,7 @@ def require_rate(
     With the names of the `states` its text says which of them grows fastest; `advice` ends it.
     """
     needed = rate_needed(dynamics)
-    if not rate_bit_s * (1.0 - erased) > needed:
-        lost = f", of which {100.0 * erased:g} % are lost," if erased else ""
+    if not rate_bit_s > needed:
         fastest = ""
         if states:
             values, vectors = np.linalg.eig(dynamics)
@@ -136,8 +131,8 @@ def require_rate(
             name = states[int(np.argmax(np.abs(vectors[:, place])))]
             fastest = f", {name} fastest by {values[place].real:.4g} 1/s"
         raise RateTooLow(
-            f"{rate_bit_s:.4g} bit/s{lost} are too few: this plant grows by itself{fastest}, and the "
-            f"data-rate theorem asks for more than {needed / (1.0 - erased):.4g} bit/s{advice}"
+            f"{rate_bit_s:.4g} bit/s are too few: this plant grows by itself{fastest}, and the "
+            f"data-rate theorem asks for more than {needed:.4g} bit/s{advice}"
         )
     return needed
 

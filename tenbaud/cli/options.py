@@ -178,8 +178,8 @@ class _Configured:
     line_rate: int | None = None
     """Bits per second on the serial line (115200)."""
     downlink: str | None = None
-    """With --link serial: separate link for the commands, zenoh or a second port. What comes down is
-    --set channel.downlink=narrow, compact or full."""
+    """With --link serial: separate link for the commands, zenoh or a second port. For what comes
+    down: --set channel.downlink=... (narrow, compact, full)."""
     impair: Impair = None
     sabotage: str | None = None
     """Corrupt one bit of this end's codec on purpose, such as sample=500,field=range."""

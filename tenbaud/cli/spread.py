@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import MISSING, fields, is_dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -16,31 +16,43 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 
 
-def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """Let typer see the fields of a command's dataclass arguments as options of the command.
+class spread:  # noqa: N801  # a decorator
+    """Lets typer see the fields of a command's dataclass arguments as options of the command.
 
-    The command itself gets each dataclass whole. Its own options come after those of the dataclass.
+    The command itself gets each dataclass whole. Options come in the order of its arguments. They are
+    made when they are asked for: the commands that are not run take no time.
     """
-    hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
-    parameters: list[inspect.Parameter] = []
-    for name, parameter in inspect.signature(command).parameters.items():
-        if name in groups:
-            parameters += _parameters(groups[name])
-        else:
-            parameters.append(_parameter(name, hints[name], parameter.default))
 
-    def run(**values: Any) -> None:
+    def __init__(self, command: Callable[..., None]) -> None:
+        self._command = command
+        self.__name__, self.__doc__ = command.__name__, command.__doc__
+
+    def __call__(self, **values: Any) -> None:
+        groups: dict[str, Any] = {name: one for name, one in self._hints.items() if is_dataclass(one)}
         whole = {
             name: kind(**{field: values.pop(field) for field in kind.__dataclass_fields__})
             for name, kind in groups.items()
         }
-        command(**whole, **values)
+        self._command(**whole, **values)
 
-    run.__name__, run.__doc__ = command.__name__, command.__doc__
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {one.name: one.annotation for one in parameters}
-    return run
+    @cached_property
+    def _hints(self) -> dict[str, Any]:
+        return get_type_hints(self._command, include_extras=True)
+
+    @cached_property
+    def __signature__(self) -> inspect.Signature:
+        parameters: list[inspect.Parameter] = []
+        for name, parameter in inspect.signature(self._command).parameters.items():
+            hint = self._hints[name]
+            if is_dataclass(hint):
+                parameters += _parameters(hint)
+            else:
+                parameters.append(_parameter(name, hint, parameter.default))
+        return inspect.Signature(parameters)
+
+    @property
+    def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]  # of this command
+        return {one.name: one.annotation for one in self.__signature__.parameters.values()}
 
 
 def _parameter(name: str, hint: Any, default: Any) -> inspect.Parameter:
@@ -50,7 +62,7 @@ def _parameter(name: str, hint: Any, default: Any) -> inspect.Parameter:
 def _parameters(group: Any) -> Iterator[inspect.Parameter]:
     """Yield the option of each field; a plain switch that is off has no `--no-` form."""
     hints = get_type_hints(group, include_extras=True)
-    texts = {name: text for kind in group.__mro__ for name, text in _texts(kind).items()}
+    texts = {name: text for kind in reversed(group.__mro__) for name, text in _texts(kind).items()}
     for one in fields(group):
         default = inspect.Parameter.empty if one.default is MISSING else one.default
         yield _parameter(one.name, _hint(one.name, hints[one.name], default, texts), default)

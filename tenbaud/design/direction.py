@@ -10,6 +10,7 @@ two. Of all N, the one under which the mean error is least is kept.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -65,9 +66,9 @@ def design_direction(
     alpha = max(0.67, 0.58 + 0.18 * used)
     # On a plant that grows, steps are larger than the best ones: smaller ones lose it now and then.
     kappa = min(max(0.75 + 0.75 * used, 1.15), 1.25) if needed > 0.0 else 1.0
-    scaled = (transition * sizes / sizes[:, None], noise / products, cost * products)
+    scaled = (transition * sizes / sizes[:, None], noise / products, cost * products, ideal * products)
     with np.errstate(all="ignore"):
-        best = _search(*scaled, ideal * products, alpha, bits)
+        best = _search(tuple(one.tobytes() for one in scaled), alpha, bits)
     return DirectionParameters(
         transition=rows_of(transition),
         noise=rows_of(noise),
@@ -122,7 +123,11 @@ def design_learning(
     )
 
 
-def _search(F: Matrix, Q: Matrix, M: Matrix, ideal: Matrix, alpha: float, bits: int) -> Turn:
+@lru_cache(maxsize=64)
+def _search(matrices: tuple[bytes, ...], alpha: float, bits: int) -> Turn:
+    """Search once for each plant and rate: many flights of one ask for the same."""
+    size = math.isqrt(len(matrices[0]) // 8)
+    F, Q, M, ideal = (np.frombuffer(one).reshape(size, size) for one in matrices)
     covariance = Q
     for _ in range(GROWN):
         covariance = _symmetric(F @ covariance @ F.T + Q)

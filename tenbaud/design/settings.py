@@ -44,7 +44,7 @@ def settings_of(plant: Matrices, rate_baud: float | None, over: Mapping[str, Any
     most = load_config(OWN, None, {"limits": over.get("limits", {})}).limits.command_max
     if most is None:
         most = tuple(np.maximum(COMMAND_MAX, 2.0 * abs(plant.u0)).tolist())
-    largest = np.array(_per_input("limits.command_max", most, model, len(plant.u0)))
+    largest = np.array(_per_input(most, model, len(plant.u0)))
     model["input_steps_per_unit"] = [10.0 ** math.floor(math.log10(STEPS_MAX / one)) for one in largest]
     if not given.keys() & {"densities", "G"}:
         assumed = (DISTURBED * largest) ** 2 * timing["symbol_period_s"]
@@ -85,10 +85,11 @@ def _rate(rate_baud: float | None, over: Mapping[str, Any]) -> float:
     return checked.channel.rate_baud
 
 
-def _per_input(field: str, value: float | Vector, model: Mapping[str, Any], inputs: int) -> Vector:
+def _per_input(most: float | Vector, model: Mapping[str, Any], inputs: int) -> Vector:
     names = model.get("inputs") or [one.name for one in named("input", inputs)]
+    signals = Signals((), tuple([InputSignal(name) for name in names]), ())
     try:
-        return per_input(field, value, Signals((), tuple([InputSignal(name) for name in names]), ()))
+        return per_input("limits.command_max", most, signals)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

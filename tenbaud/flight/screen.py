@@ -158,10 +158,8 @@ def _lockstep(status: Status) -> Text:
         text.stylize("yellow")
     if narrow := status.get("narrow"):
         text = Text(f"certain before sample {narrow['confirmed_to']}", style=text.style)
-        text.append(
-            f", {narrow['unconfirmed']} behind; {narrow['hypotheses']} hypotheses", style="default"
-        )
-        text.append(f", rest {narrow['rest']:.0e}", style="default")
+        behind = f", {narrow['unconfirmed']} behind; {narrow['hypotheses']} hypotheses"
+        text.append(f"{behind}, rest {narrow['rest']:.0e}", style="default")
     else:
         text.append(f"  {status['digest_checks']} digests", style="default")
         text.append(f", {desyncs} differed", style="red" if desyncs else "default")

@@ -121,7 +121,7 @@ class _Reading:
         )
 
     def _has_inputs(self) -> bool:
-        named = any(self.roles.role(name, "").startswith("in:") for name in self.section.columns)
+        named = any(self.roles.role(name).startswith("in:") for name in self.section.columns)
         return named or any(place is not None for _, place in self.chosen.inputs)
 
     def _clock(self) -> Clock:

@@ -77,7 +77,7 @@ class Roles:
         found: dict[str, str] = {}
         for role, column in known.items():
             try:
-                found[self.role(role, "")] = column
+                found[self.role(role)] = column
             except LogError:
                 self.notes.append(f"column {column}: left out, {role} is no signal of the model")
         if section.period_s is not None:
@@ -88,11 +88,11 @@ class Roles:
                 )
             if "time" in found:  # as the format suggests; at most it counts the rows
                 found["index"] = found.pop("time")
-        return found | {self.role(name, ""): column for name, column in section.columns.items()}
+        return found | {self.role(name): column for name, column in section.columns.items()}
 
-    def role(self, name: str, kind: str) -> str:
+    def role(self, name: str) -> str:
         """Return `out:NAME`, `in:NAME`, "time" or "index" for a name that a person gives."""
-        prefix, colon, rest = name.partition(":")
+        kind, (prefix, colon, rest) = "", name.partition(":")
         if colon and prefix in ("out", "in"):
             kind, name = prefix, rest
         if not kind and name in CLOCKS:
@@ -119,9 +119,7 @@ class Roles:
     def setting(self, values: Mapping[str, object], role: str, kind: str) -> object | None:
         """Return the entry of a signal in a table such as `units`; None if there is none."""
         every = EVERY.get(kind, ())
-        own = [
-            value for name, value in values.items() if name not in ALL and self.role(name, "") == role
-        ]
+        own = [value for name, value in values.items() if name not in ALL and self.role(name) == role]
         return (own or [value for name, value in values.items() if name in every] or [None])[-1]
 
     def _clock(self, name: str, given: Mapping[str, str], names: Sequence[str]) -> int | None:

@@ -48,7 +48,7 @@ def plant_parts(plant: Any, outputs: int) -> PlantParts:
         start = (*plant.state, *plant.motors)
         of = pair_reader(len(plant.state), len(plant.motors))
         step = plant_step_of(plant.slopes)
-        return PlantParts(step, pair_output(), of, start, plant.step_constants)
+        return PlantParts(step, compiled(first_output), of, start, plant.step_constants)
     of = reader(len(getattr(plant, "state", ())))
     if hasattr(plant, "step_function"):
         return PlantParts(compiled(plant.step_function), first, of, plant.state, plant.constants)
@@ -91,11 +91,6 @@ def pair_reader(first: int, second: int) -> Any:
     return named(read, f"read_{first}_{second}")
 
 
-@cache
-def pair_output() -> Any:
-    """Return a compiled function that reads an output which is a state of the first tuple."""
-
-    def output(state: Any, constants: Any, place: int) -> Any:
-        return state[0][place]
-
-    return named(output, "output_of_pair")
+def first_output(state: Any, constants: Any, place: int) -> Any:
+    """Return an output that is a state of the first tuple."""
+    return state[0][place]

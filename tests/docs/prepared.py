@@ -3,8 +3,8 @@
 A page types in a dozen commands, and each would spend most of its time on imports. Here one process has
 imported the libraries; a copy of it (`fork`) imports the project as a page's folder has it, and each
 command of that page is a copy of this copy. `tenbaud` and `python -c` in that folder are small programs
-that ask for a copy, pass it their streams, forward signals, and end as it ended. The long tests and the
-README start ordinary processes.
+that ask for a copy, pass it their streams, forward signals, and end as it ended. The long tests and
+what `make` starts are ordinary processes.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ def serve_page(folder: Path, environment: dict[str, str], programs: Path) -> soc
         streams = [nothing.fileno(), 2, listener.fileno()]
         socket.send_fds(connection, [json.dumps(request).encode()], streams)
     for name in ("tenbaud", "python", "python3"):
-        (programs / name).write_text(
+        program = programs / name
+        program.write_text(
             PROGRAM.format(
                 python=sys.executable,
                 is_python=name != "tenbaud",
@@ -83,6 +84,7 @@ def serve_page(folder: Path, environment: dict[str, str], programs: Path) -> soc
                 server=server,
             )
         )
+        program.chmod(0o755)
     return connection
 
 

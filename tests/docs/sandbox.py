@@ -3,12 +3,13 @@
 The commands stand in the pages as people type them. What makes them safe to run in a test is here:
 the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
 that `make` would build is there already, and the home folder is an empty one; what was compiled for
-studies is shared. pytest only collects in
-it, one folder with tests of both halves: the tests that type in `make test` must not run themselves.
+studies is shared. pytest only collects in it, and two files of tests alone: the tests that type in
+`make test` must not run themselves.
 """
 
 from __future__ import annotations
 
+import fnmatch
 import os
 import re
 import shlex
@@ -26,9 +27,11 @@ from tests.docs import prepared
 from tests.docs.blocks import Block
 from tests.rules.sources import TOP
 
-LEFT_OUT = (".git", ".venv", "*.egg-info", ".*_cache", ".hypothesis")
+LEFT_OUT = (".git", ".venv", "*.egg-info", ".cache", ".*_cache", ".hypothesis")
 LEFT_OUT_AT_TOP = {"runs", "site", "dist", "build"}
 """Left out of the top folder only: `tenbaud/build` is a package."""
+COLLECTED = ("tests/transmitter/test_guard.py", "tests/transmitter/test_overload.py")
+"""Tests of both halves of `make test`."""
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
@@ -55,13 +58,14 @@ class Sandbox:
     copies: bool = False
     """whether commands may begin with everything imported (`tests/docs/prepared.py`)"""
     ports: dict[str, str] = field(default_factory=dict)
+    _path: str = ""
     _settled: bool = True
     _prepared: socket.socket | None = None
     _background: list[tuple[Block, subprocess.Popen[str], Path]] = field(default_factory=list)
 
     def __enter__(self) -> Sandbox:
         self.top = self.folder / "tenbaud"
-        shutil.copytree(TOP, self.top, ignore=_left_out, symlinks=True)
+        shutil.copytree(TOP, self.top, ignore=self._left_out, symlinks=True)
         (self.folder / "home").mkdir()
         self._exchange_default_port()
         for name in ("demo", "view"):  # the live page's port: any free one
@@ -74,9 +78,13 @@ class Sandbox:
             program = programs / name
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {how} "$@"\n')
             program.chmod(0o755)
+        self._path = str(programs)
         if self.copies and warm.CLONE is not None:
-            self._prepared = prepared.serve_page(self.top, self._environment(), programs)
-        (programs / "activate").write_text(f'PATH="{programs}:$PATH"\n')
+            typed = self.folder / "typed"  # `make` starts the ordinary ones
+            typed.mkdir()
+            self._prepared = prepared.serve_page(self.top, self._environment(), typed)
+            self._path = f"{typed}{os.pathsep}{programs}"
+        (programs / "activate").write_text(f'PATH="{self._path}:$PATH"\n')
         for stamp in (".installed", ".installed-dev"):  # in this order: the second needs the first
             (self.top / ".venv" / stamp).touch()
         return self
@@ -139,13 +147,13 @@ class Sandbox:
 
         return {
             **{name: value for name, value in os.environ.items() if not name.startswith("PYTEST")},
-            "PATH": os.pathsep.join([str(self.top / ".venv" / "bin"), os.environ.get("PATH", "")]),
+            "PATH": os.pathsep.join([self._path, os.environ.get("PATH", "")]),
             "PYTHONPATH": str(self.top),
             "HOME": str(self.folder / "home"),
             "MPLCONFIGDIR": matplotlib.get_configdir(),
             "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")),
             "COLUMNS": "200",
-            "PYTEST_ADDOPTS": "--collect-only tests/transmitter/loops",
+            "PYTEST_ADDOPTS": " ".join(["--collect-only", *COLLECTED]),
             "NO_COLOR": "1",
         }
 
@@ -173,6 +181,13 @@ class Sandbox:
             if not found:
                 raise BlockFailed(f"{block.name} does not say, or not there: {line.strip()}\n\n{said}")
 
+    def _left_out(self, folder: str, names: list[str]) -> set[str]:
+        """Return which entries of a folder are not copied."""
+        unread = set(fnmatch.filter(names, "test_*.py")) if self.copies else set()
+        unread = {name for name in unread if not f"{folder}/{name}".endswith(COLLECTED)}
+        at_top = LEFT_OUT_AT_TOP & set(names) if Path(folder) == TOP else set()
+        return shutil.ignore_patterns(*LEFT_OUT)(folder, names) | at_top | unread
+
     def _free_port(self, match: re.Match[str]) -> str:
         port = match[0]
         if port != "0" and port not in self.ports:
@@ -195,12 +210,6 @@ class Sandbox:
         whole = path.read_text()
         assert text in whole
         path.write_text(whole.replace(text, other))
-
-
-def _left_out(folder: str, names: list[str]) -> set[str]:
-    """Return which entries of a folder are not copied."""
-    at_top = LEFT_OUT_AT_TOP & set(names) if Path(folder) == TOP else set()
-    return shutil.ignore_patterns(*LEFT_OUT)(folder, names) | at_top
 
 
 def _ends(process: subprocess.Popen[str], within_s: float) -> bool:

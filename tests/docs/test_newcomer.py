@@ -29,7 +29,8 @@ GIF_BYTES_MAX = 1_000_000
 def walked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """Type in every block; return the folder and what each block said, by its first command."""
     said: dict[str, str] = {}
-    with pytest.MonkeyPatch.context() as patch, Sandbox(tmp_path_factory.mktemp("newcomer")) as sandbox:
+    folder = tmp_path_factory.mktemp("newcomer")
+    with pytest.MonkeyPatch.context() as patch, Sandbox(folder, copies=True) as sandbox:
         for block in BLOCKS:
             first = first_words(block)
             patch.setenv("TENBAUD_FIGURE", "1" if first == "make demo" else "0")

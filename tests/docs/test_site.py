@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urldefrag
@@ -68,6 +69,11 @@ class References(html.parser.HTMLParser):
             self.loads.append(named["src"])
 
 
+@cache
+def references(page: Path) -> References:
+    return References(page)
+
+
 def test_when_the_site_is_built_then_there_is_no_warning_and_every_page_is_there(site: Path) -> None:
     names = {page.relative_to(site).as_posix() for page in pages(site)}
     assert {"index.html", "faq.html", "rigs/index.html", "reference/python.html"} <= names
@@ -81,7 +87,7 @@ def test_when_the_site_is_built_then_there_is_no_warning_and_every_page_is_there
 
 def test_when_a_page_is_loaded_then_everything_it_asks_for_is_in_the_site(site: Path) -> None:
     for page in pages(site):
-        for target in References(page).loads:
+        for target in references(page).loads:
             assert not re.match(r"(?:https?:)?//", target), f"{page}: {target}"
             if not target.startswith("data:"):
                 assert (page.parent / unquote(target.split("?")[0])).is_file(), f"{page}: {target}"
@@ -94,9 +100,9 @@ def test_when_a_style_sheet_is_loaded_then_it_asks_no_other_host(site: Path) -> 
 
 
 def test_when_a_link_is_followed_then_page_and_anchor_are_there(site: Path) -> None:
-    anchors = {page.resolve(): References(page).anchors for page in pages(site)}
+    anchors = {page.resolve(): references(page).anchors for page in pages(site)}
     for page in pages(site):
-        for link in References(page).links:
+        for link in references(page).links:
             if re.match(r"\w+:", link):
                 continue
             path, fragment = urldefrag(unquote(link))

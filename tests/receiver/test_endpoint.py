@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
+from channel.errors import ConfigMismatch
+from channel.line.line import Downlink
+from channel.links.serial.wire import SerialWire
 from channel.protocol import wire
 from channel.protocol.frames import Commands, Hello, Symbol, Welcome
-from receiver.endpoint import ReceiverEndpoint
+from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import ConstantController, identity_of, pitch_codec, terms
 
@@ -58,3 +63,15 @@ def test_when_a_step_has_no_message_then_deadlines_pass() -> None:
     assert end.session.counts["erasures"] == 1
     assert len(reply.frames) == 1
     assert reply.deadline_ns == 220 * MS
+
+
+def test_a_stepped_receiver_tells_a_flight_on_the_other_clock_from_what_a_line_damaged() -> None:
+    wire_of_line = SerialWire(2)
+    session = ReceiverSession(CODEC, terms(), ConstantController(1.0, 1.0), identity_of(CODEC), 77)
+    end = SteppedEndpoint(session, Downlink(wire_of_line))
+    assert end.take(wire_of_line.encode(Symbol(77, 0, 0, 1)), 0) == []
+    assert end.take(b"garbage", 0) == []
+    identity = session.identity
+    hello = Hello(5, identity.version, identity.config_digest, identity.numerics_probe)
+    with pytest.raises(ConfigMismatch, match="give both the same --clock"):
+        end.take(wire.encode(hello), 0)

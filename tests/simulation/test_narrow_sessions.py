@@ -29,6 +29,8 @@ SCHEMES = {
     "coded 2": (coded(Layout(2), DIRECTION), None),
     "coded 4": (coded(Layout(4), DIRECTION, lead_ticks=10), None),
 }
+CLEAN = ("mirrored 2", "coded 2")
+"""Flown over a clean line too; the others under make soak."""
 
 
 def controller_of(queue: int | None) -> Announced | Pid:
@@ -37,8 +39,19 @@ def controller_of(queue: int | None) -> Announced | Pid:
     return Pid(PAPER_GAINS, Square(math.pi / 2, 25.0, TICK_S), TICK_S)
 
 
-@pytest.mark.parametrize("faults", [Faults(), LOSSES], ids=["clean", "losses"])
-@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize(
+    ("name", "faults"),
+    [
+        pytest.param(
+            name,
+            faults,
+            id=f"{name}-{line}",
+            marks=() if line == "losses" or name in CLEAN else pytest.mark.soak,
+        )
+        for name in SCHEMES
+        for line, faults in (("clean", Faults()), ("losses", LOSSES))
+    ],
+)
 def test_when_sessions_fly_then_all_bits_are_those_of_the_flight_without(
     name: str, faults: Faults
 ) -> None:

@@ -33,13 +33,13 @@ class Flown(NamedTuple):
 
 HELICOPTER = {"travel": 1.0, "elevation": 0.45, "pitch": 0.65}
 PRESETS = {
-    "integrator-10baud": Flown(20.0, 3.0, {"angle": 0.005}, {"angle": 1.0}),
-    "servo-10baud": Flown(20.0, 3.0, {"angle": 0.01}, {"angle": 1.5}),
-    "aero-20baud": Flown(20.0, 3.0, {"pitch": 0.006, "yaw": 0.006}, {"pitch": 0.5, "yaw": 1.0}),
+    "integrator-10baud": Flown(10.0, 3.0, {"angle": 0.005}, {"angle": 1.0}),
+    "servo-10baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 1.5}),
+    "aero-20baud": Flown(10.0, 3.0, {"pitch": 0.006, "yaw": 0.006}, {"pitch": 0.5, "yaw": 1.0}),
     "furuta-50baud": Flown(10.0, 3.0, {"arm": 0.02, "pendulum": 0.01}, {"arm": 0.6, "pendulum": 0.2}),
-    "heading-1baud": Flown(200.0, 6.0, {"heading": 0.01}, {"heading": 0.6}),
+    "heading-1baud": Flown(100.0, 6.0, {"heading": 0.01}, {"heading": 0.6}),
     "helicopter-10baud": Flown(
-        20.0,
+        10.0,
         3.0,
         {"travel": 0.015, "elevation": 0.015, "pitch": 0.025},
         HELICOPTER,
@@ -63,7 +63,7 @@ MORE = {
     "pendulum-20baud": Flown(10.0, 3.0, {"angle": 0.006}, {"angle": 0.2}),
 }
 """Presets of the same plants at other rates."""
-ALIKE = ("integrator-10baud", "servo-10baud", "aero-20baud", "pendulum-13baud")
+ALIKE = ("integrator-10baud", "servo-10baud", "aero-20baud", "pendulum-13baud", "helicopter-usual")
 """Those that differ in memory alone; two processes fly them in the long tests. The others have the
 shortest and the longest period, the most outputs, and words of several bits."""
 WORDS = tuple(preset for preset, flown in MORE.items() if flown.bits > 1)
@@ -125,7 +125,7 @@ def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) ->
 
 
 def test_when_the_helicopter_is_off_then_its_flight_says_by_how_much(tmp_path: Path) -> None:
-    settings = {"duration_s": 60.0, "transmitter.plant.mismatch": (0.1, -0.1, 0.1)}
+    settings = {"duration_s": 30.0, "transmitter.plant.mismatch": (0.1, -0.1, 0.1)}
     run = fly("helicopter-10baud", settings=settings, out=tmp_path / "run")
     learned = run.summary["learned"]
     for name, off in (("pitch_thrust", 0.1), ("elevation_weight", -0.1), ("elevation_thrust", 0.1)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 from plant_sim.disturbance import WhiteTorque
 from plant_sim.encoder import Encoder
@@ -18,6 +19,7 @@ EXCITATION_A = "square:0.2,0,2.5"
 EXCITATION_B = "square:0.25,0.1,3"
 
 
+@cache
 def experiment(
     excitation: str, duration_s: float = 60.0, q: float = 0.0, seed: int = 1, step_s: float = STEP_S
 ) -> Record:

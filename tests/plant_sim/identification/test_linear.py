@@ -135,7 +135,7 @@ def test_when_an_input_never_moves_then_it_is_named_and_no_model_is_made() -> No
 
 
 def test_when_two_inputs_move_alike_then_their_gains_cannot_be_separated() -> None:
-    record = record_of(COUPLED, 1)
+    record = record_of(COUPLED, 1, STEPS // 3)
     alike = Record(H, record.outputs, record.inputs[:, :1] * [1.0, 1.0])
     assert any("not exciting enough" in text for text in found_in(COUPLED, alike).refused)
 

@@ -45,14 +45,16 @@ def test_when_sixty_seconds_are_excited_then_all_parameters_are_within_three_per
     assert found.condition > 0.01
 
 
+@pytest.mark.parametrize("seed", [1, *(pytest.param(one, marks=pytest.mark.soak) for one in (2, 3))])
 @pytest.mark.parametrize("excitation", [EXCITATION_A, EXCITATION_B])
-def test_when_white_torque_pushes_then_all_parameters_are_within_ten_percent(excitation: str) -> None:
+def test_when_white_torque_pushes_then_all_parameters_are_within_ten_percent(
+    excitation: str, seed: int
+) -> None:
     """a_w is the hard one: no unbiased estimate from 60 s of these data has less than 5 to 6 %."""
     filters = replace(PAPER, bandwidth_rad_s=3.0, forgetting_per_s=0.002)
-    for seed in (1, 2, 3):
-        record = experiment(excitation, 180.0, 2e-3, seed)
-        found = regress(record, PitchStructure(equilibrium(record, math.inf)), filters)
-        assert max(map(abs, errors(values_of(found)))) < 0.10
+    record = experiment(excitation, 180.0, 2e-3, seed)
+    found = regress(record, PitchStructure(equilibrium(record, math.inf)), filters)
+    assert max(map(abs, errors(values_of(found)))) < 0.10
 
 
 def test_when_noise_is_drawn_again_then_the_errors_are_what_the_uncertainty_says() -> None:
@@ -98,7 +100,7 @@ def test_when_the_motor_lag_is_not_given_then_it_is_found() -> None:
 
 
 def test_when_something_else_pushes_the_body_then_it_is_never_a_silent_wrong_estimate() -> None:
-    record = experiment(EXCITATION_A)
+    record = experiment(EXCITATION_A, 20.0, step_s=0.02)
     times = np.arange(len(record)) * record.step_s
     pushed = replace(record, outputs=record.outputs + 0.3 * np.sin(2.0 * times)[:, None])
     found = identify(pushed, PitchStructure(TRUE.equilibrium_rad))
@@ -137,7 +139,7 @@ def random_volts(steps: int, volts: float, every: int, seed: int = 1) -> Array:
 
 
 def test_when_the_plant_is_faster_than_the_usual_filters_then_they_follow_it() -> None:
-    record = swing(0.01, random_volts(3000, 5.0, 40), 0.1, 49.0, -1.6)
+    record = swing(0.01, random_volts(1500, 5.0, 40), 0.1, 49.0, -1.6)
     found = identify(record, PitchStructure())
     assert found.values["a_w"] == pytest.approx(0.1, abs=0.02)
     assert [found.values["a_th cos(theta_0)"], found.values["k_v"]] == pytest.approx(

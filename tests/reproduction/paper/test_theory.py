@@ -29,7 +29,7 @@ def test_when_bits_flip_then_only_the_echo_keeps_the_copies_equal() -> None:
     assert float(np.max(apart.apart_rad[before])) == 0.0
 
 
-@pytest.mark.parametrize("rate", [10, 50])
+@pytest.mark.parametrize("rate", [10, pytest.param(50, marks=pytest.mark.soak)])
 def test_when_a_rate_of_the_table_is_flown_then_its_errors_come_out(rate: int) -> None:
     cells = r"([\d.]+) mrad \| " * 3
     row = re.search(rf"^\| {rate} bit/s \| {cells}", LIMITS, re.MULTILINE)

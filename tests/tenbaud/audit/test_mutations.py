@@ -25,6 +25,8 @@ from tests.tenbaud.flown import flown
 from tests.tenbaud.replay.test_old_recordings import TWO_EPOCHS
 
 SEED = 20261126
+AS_IN_ANY_FLIGHT = frozenset({"symbol", "epoch", "event", "estimate", "gap"})
+"""Topics with the same claims for any downlink; the long tests change them in narrow flights too."""
 SHARE_MIN = 0.85
 """Of all changes, those that are found; the others are of fields that carry no claim."""
 
@@ -40,7 +42,8 @@ def is_named(mutation: Mutation, original: Original, result: Audit) -> bool:
     """Whether a finding names topic and row, and the field if one was changed."""
     row = original.row(mutation)
     key = KINDS[mutation.end][mutation.topic].channel.fields[0].name
-    lines = [line for line in result.leaks + result.gaps if mutation.topic in line]
+    named = (mutation.topic, mutation.topic.replace("_", " "))
+    lines = [line for line in result.leaks + result.gaps if any(one in line for one in named)]
     # Of rows that nothing else tells of, it is their number that is wrong.
     lines += [line for line in result.leaks + result.gaps if "all rows" in line]
     # Of swapped rows either may be named, and a row whose key was changed has another name now; an
@@ -55,8 +58,13 @@ def is_named(mutation: Mutation, original: Original, result: Audit) -> bool:
     return any(name in line for line in lines for name in names)
 
 
-def survey(run: Path, folder: Path, rows_per_topic: int) -> tuple[int, int, list[str]]:
-    """Return how many changes there were, how many were found, and those that should have been."""
+def survey(
+    run: Path, folder: Path, rows_per_topic: int, without: frozenset[str] = frozenset()
+) -> tuple[int, int, list[str]]:
+    """Return how many changes there were, how many were found, and those that should have been.
+
+    No row of the topics `without` is changed.
+    """
     original, noise = Original(run), random.Random(SEED)
     record = load_record(run)
     evidence = Evidence(record)
@@ -64,6 +72,8 @@ def survey(run: Path, folder: Path, rows_per_topic: int) -> tuple[int, int, list
     tried = found = 0
     missed: list[str] = []
     for mutation in original.mutations(rows_per_topic, noise):
+        if mutation.topic in without:
+            continue
         tried += 1
         shutil.rmtree(folder, ignore_errors=True)
         original.write(mutation, folder, noise)
@@ -96,8 +106,8 @@ def test_every_change_of_a_flight_is_found(tmp_path: Path) -> None:
 def test_every_change_of_a_narrow_flight_is_found(tmp_path: Path) -> None:
     narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.05"}
     run = flown(tmp_path / "run", duration_s=2.0, **narrow)
-    tried, found, missed = survey(run.path, tmp_path / "mutant", 1)
-    assert tried > 110
+    tried, found, missed = survey(run.path, tmp_path / "mutant", 1, AS_IN_ANY_FLIGHT)
+    assert tried > 60
     assert not missed, "\n".join([f"seed {SEED}", *missed])
     assert found > SHARE_MIN * tried
 

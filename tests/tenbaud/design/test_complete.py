@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import re
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +55,18 @@ channel = {rate_baud = 20.0}
 """
 
 
+@cache
+def _designed_pendulum() -> dict[str, Any]:
+    return completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+
+
+def designed_pendulum() -> dict[str, Any]:
+    """Return the pendulum at 20 bit/s, designed once for all tests."""
+    return copy.deepcopy(_designed_pendulum())
+
+
 def test_when_a_configuration_is_completed_then_both_ends_read_the_same_bits() -> None:
-    values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+    values = designed_pendulum()
     config = load_config("paper-10baud", None, values)
     codec = build_codec(config)
     assert isinstance(codec.model, LinearModel)
@@ -99,7 +111,7 @@ def test_when_a_linear_model_was_never_designed_then_it_says_how() -> None:
 
 
 def test_when_the_plant_is_discrete_then_its_continuous_one_is_found() -> None:
-    values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+    values = designed_pendulum()
     discrete = {name: value for name, value in values["model"].items() if name not in "AB"}
     again = completed({**values, "model": discrete})
     for name in ("transition", "worth", "start"):
@@ -164,7 +176,7 @@ def test_when_the_weights_hide_a_growing_motion_then_design_and_flight_name_who_
 def test_when_a_plant_grows_then_its_coder_is_designed_for_what_its_encoders_show() -> None:
     values = {**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}}
     exactly = {"transmitter": {"encoders": {"quantised": False}}}
-    exact, coarse = completed({**values, **exactly}), completed(values)
+    exact, coarse = completed({**values, **exactly}), designed_pendulum()
     assert coarse["coder"]["noise"][0][0] > 2.0 * exact["coder"]["noise"][0][0]
     own = completed({**values, "transmitter": {"encoders": {"angle": {"counts_per_turn": 4096}}}})
     assert own["coder"] == coarse["coder"], "4096 counts are the default"
@@ -206,7 +218,7 @@ def test_when_a_preset_is_slowed_below_its_smallest_rate_then_every_way_to_fly_i
 
 
 def test_when_a_coder_is_of_another_plant_then_it_is_refused() -> None:
-    values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+    values = designed_pendulum()
     three = {"kind": "linear", "F": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], "C": [[1.0, 0, 0]]}
     config = load_config("paper-10baud", None, {**values, "model": {**three, "E": [[1.0]] * 3}})
     with pytest.raises(ConfigError, match="corrects 2 states and the model takes corrections of 3"):

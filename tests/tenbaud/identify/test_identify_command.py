@@ -79,8 +79,8 @@ def test_when_the_simulated_rig_is_identified_then_both_ends_can_fly_with_the_re
 
 def test_when_a_run_is_identified_then_its_own_plant_is_found(tmp_path: Path) -> None:
     flown = tmp_path / "flown"
-    arguments = ["demo", "--link", "memory", "--mismatch", "0.1", "--json", "--out", str(flown)]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
+    arguments = ["demo", "--link", "memory", "--mismatch", "0.1", "--duration", "50", "--json"]
+    assert CliRunner().invoke(app, [*arguments, "--out", str(flown)]).exit_code == 0
     estimates = found(run(str(flown), "--json", "--no-fly", "--out", str(tmp_path / "out")))
     for name, true in TRUE.items():
         assert estimates[name] == pytest.approx(1.1 * true, rel=0.03)

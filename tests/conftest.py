@@ -64,7 +64,6 @@ PAGES = "tests/docs/test_commands.py::test_when_a_page_is_typed_in_then"
 
 COLD = (
     "tests/tenbaud/endings/",
-    "tests/tenbaud/test_fire.py",
     "tests/tenbaud/test_restarts.py",
     "tests/tenbaud/test_not_flown.py",
     "tests/tenbaud/view/test_gate.py",

@@ -58,7 +58,7 @@ def simulated_rms(seconds: float, lead_ticks: int) -> float:
 
 
 @pytest.mark.real_time
-@pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
+@pytest.mark.parametrize("form", ["cobs", pytest.param("ascii", marks=pytest.mark.soak), "quarc"])
 def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
     rig, ends = PEERS[form]
     flown = fly_emulated(form, tmp_path / "real", seconds=SECONDS, rig_arguments=rig, arguments=ends)

@@ -106,6 +106,8 @@ def _as_processes() -> Iterator[Any]:
     for preset in (*PRESETS, *WORDS):
         soak = [pytest.mark.soak] if preset in ALIKE else []
         yield pytest.param(preset, "virtual", marks=soak)
+        if preset == "helicopter-10baud":
+            soak = [pytest.mark.soak]  # with an emulated rig in test_three_axes.py and test_motors.py
         if preset in PRESETS:
             yield pytest.param(preset, "real", marks=[*soak, pytest.mark.real_time])
 

@@ -214,7 +214,7 @@ def test_one_receiver_serves_it_beside_another_plant(tmp_path: Path) -> None:
 
 
 @pytest.mark.real_time
-@pytest.mark.parametrize("form", ["cobs", "quarc"])
+@pytest.mark.parametrize("form", [pytest.param("cobs", marks=pytest.mark.soak), "quarc"])
 def test_an_emulated_rig_turns_three_encoders(form: str, tmp_path: Path) -> None:
     mission = ("--preset", "helicopter-10baud", "--set", "mission=two-boxes")
     vectors = VECTORS if form == "quarc" else ()

@@ -185,6 +185,6 @@ def condition_of(squares: Array, constants: Sequence[int] = ()) -> float:
         across = squares[np.ix_(shown, constants)]
         own = own - across @ np.linalg.pinv(squares[np.ix_(constants, constants)]) @ across.T
     levels = np.sqrt(np.maximum(np.diag(own), 0.0))
-    if not np.all(levels**2 > 1e-12 * power):
+    if not np.all(levels**2 > 1e-12 * np.maximum(power, 0.0)):
         return 0.0
     return float(max(0.0, np.linalg.eigvalsh(own / np.outer(levels, levels))[0]))

@@ -12,7 +12,7 @@ from scipy.signal import cont2discrete, dlsim
 
 from plant_sim.identification import simulation
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.estimator import estimate, moments_of
+from plant_sim.identification.estimator import condition_of, estimate, moments_of
 from plant_sim.identification.excitation import pseudo_random
 from plant_sim.identification.faults import require_units
 from plant_sim.identification.filters import Array, SignalFilter, low_pass
@@ -208,6 +208,12 @@ def test_when_a_structure_is_not_known_then_the_known_ones_are_named(text: str, 
 def test_when_a_structure_of_one_output_gets_two_then_both_are_named() -> None:
     with pytest.raises(IdentificationError, match=r"2 \(pitch, yaw\)"):
         parse_linear("siso:2,1", ("pitch", "yaw"), ("u",))
+
+
+@pytest.mark.parametrize("power", [0.0, -1e-12, math.nan])
+def test_when_a_regressor_has_no_power_then_the_condition_is_0_without_a_warning(power: float) -> None:
+    with np.errstate(all="raise"):
+        assert condition_of(np.array([[1.0, 1e-9], [1e-9, power]])) == 0.0
 
 
 @pytest.mark.parametrize("held", [False, True])

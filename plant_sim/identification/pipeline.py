@@ -20,7 +20,7 @@ from plant_sim.identification.estimator import CONDITION_MIN
 from plant_sim.identification.faults import dominant_rad_s, require_motion
 from plant_sim.identification.filters import Array
 from plant_sim.identification.record import Record
-from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.regression import Filters, Regression, regress, require_bandwidth
 from plant_sim.identification.simulation import Segments, SimulationFit
 from plant_sim.identification.structures import (
     LinearStructure,
@@ -154,7 +154,9 @@ def _bandwidth(record: Record, structure: Structure, options: Options, notes: li
         given = usual if fits else min(float(f"{share * found:.2g}"), 0.5 / record.step_s)
         if not fits:
             notes.append(f"the outputs move most at {found:.3g} rad/s: filters of {given:g} rad/s")
-    elif not 0.05 <= found / given <= 5.0:
+        return given
+    require_bandwidth(given, record.step_s)
+    if not 0.05 <= found / given <= 5.0:
         notes.append(
             f"the outputs move most at {found:.3g} rad/s, far from the filters' {given:g} rad/s: "
             f"--bandwidth {0.7 * found:.2g} suits them, or leave it out"

@@ -93,12 +93,8 @@ def regress(
     """Filter a record and estimate the parameters of each equation."""
     if filters.lag_s < 0.0:
         raise IdentificationError(f"the motor lag is {filters.lag_s} s; it must be at least 0")
+    require_bandwidth(filters.bandwidth_rad_s, record.step_s)
     polynomial = low_pass(structure.order, filters.bandwidth_rad_s, filters.damping)
-    if filters.bandwidth_rad_s * record.step_s > 1.0:
-        raise IdentificationError(
-            f"a filter of {filters.bandwidth_rad_s:g} rad/s needs samples closer than "
-            f"{record.step_s:g} s; it may have {1.0 / record.step_s:.3g} rad/s at most"
-        )
     block = math.ceil(len(record) / blocks)
     piece = max(1, PIECE // block) * block
     sums: list[list[Moments]] = [[] for _ in structure.equations]
@@ -124,6 +120,17 @@ def regress(
     shown = np.concatenate(inputs)
     shown = np.concatenate((shown, shown[-1:]))[:rows]
     return Regression(structure, filters, found, ends * record.step_s, shown)
+
+
+def require_bandwidth(bandwidth_rad_s: float, step_s: float) -> None:
+    """Raise IdentificationError for a filter that there is not, or not at these samples."""
+    if not bandwidth_rad_s > 0.0:
+        raise IdentificationError(f"the filter bandwidth is {bandwidth_rad_s:g} rad/s; it must be above 0")
+    if bandwidth_rad_s * step_s > 1.0:
+        raise IdentificationError(
+            f"a filter of {bandwidth_rad_s:g} rad/s needs samples closer than {step_s:g} s; it may have "
+            f"{1.0 / step_s:.3g} rad/s at most"
+        )
 
 
 Columns = Mapping[tuple[int, int], Array]

@@ -107,9 +107,9 @@ def record_of(case: Case, seed: int, steps: int = STEPS, step: float | None = No
     return Record(H, np.round(seen / step) * step, u)
 
 
-def found_in(case: Case, record: Record) -> Identification:
+def found_in(case: Case, record: Record, options: Options | None = None) -> Identification:
     structure = parse_linear(case.structure, record.output_names, record.input_names)
-    return identify(record, structure)
+    return identify(record, structure, options)
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(one, marks=pytest.mark.soak) for one in (2, 3))])
@@ -214,6 +214,26 @@ def test_when_a_structure_of_one_output_gets_two_then_both_are_named() -> None:
 def test_when_a_regressor_has_no_power_then_the_condition_is_0_without_a_warning(power: float) -> None:
     with np.errstate(all="raise"):
         assert condition_of(np.array([[1.0, 1e-9], [1e-9, power]])) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("bandwidth_rad_s", "damping", "text"),
+    [
+        (0.0, 0.7, "above 0"),
+        (-1.0, 0.7, "above 0"),
+        (math.nan, 0.7, "above 0"),
+        (math.inf, 0.7, "needs samples closer"),
+        (1e200, 0.7, "needs samples closer"),
+        (1.0, 0.0, "above 0"),
+        (1.0, math.nan, "above 0"),
+    ],
+)
+def test_when_a_filter_makes_no_sense_then_it_is_refused(
+    bandwidth_rad_s: float, damping: float, text: str
+) -> None:
+    options = Options(bandwidth_rad_s=bandwidth_rad_s, filters=Filters(damping=damping))
+    with pytest.raises(IdentificationError, match=text):
+        found_in(COUPLED, record_of(COUPLED, 1, 1500), options)
 
 
 @pytest.mark.parametrize("held", [False, True])

@@ -125,11 +125,11 @@ def regress(
 def require_bandwidth(bandwidth_rad_s: float, step_s: float) -> None:
     """Raise IdentificationError for a filter that there is not, or not at these samples."""
     if not bandwidth_rad_s > 0.0:
-        raise IdentificationError(f"the filter bandwidth is {bandwidth_rad_s:g} rad/s; it must be above 0")
+        raise IdentificationError(f"filter bandwidth {bandwidth_rad_s:g} rad/s: give one above 0")
     if bandwidth_rad_s * step_s > 1.0:
         raise IdentificationError(
-            f"a filter of {bandwidth_rad_s:g} rad/s needs samples closer than {step_s:g} s; it may have "
-            f"{1.0 / step_s:.3g} rad/s at most"
+            f"a filter of {bandwidth_rad_s:g} rad/s needs samples closer than {step_s:g} s; it may "
+            f"have {1.0 / step_s:.3g} rad/s at most"
         )
 
 

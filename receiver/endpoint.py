@@ -121,9 +121,8 @@ class ReceiverEndpoint:
         answers = session.on_frame(frame, now_ns)
         if isinstance(frame, Hello):
             wire, terms = self.inlet.wire, session.terms
-            asked_ns = now_ns - wire.size(data) * terms.uplink_line_ns
             size = sum([wire.size(wire.encode(answer)) for answer in answers])
-            self._slots.answered(frame, answers, asked_ns, now_ns + size * terms.downlink_byte_ns)
+            self._slots.answered(frame, answers, now_ns + size * terms.downlink_byte_ns)
         return answers
 
 

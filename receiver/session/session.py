@@ -40,8 +40,7 @@ from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
 from receiver.session.asking import Asker
-from receiver.session.commander import Begins, Commander
-from receiver.session.echoes import EchoCommander
+from receiver.session.commander import Begins, Commander, EchoCommander
 from receiver.session.narrow import NarrowCommander
 from receiver.session.records import write_symbol
 from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample

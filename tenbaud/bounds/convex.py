@@ -9,6 +9,7 @@ IEEE TAC 62, 2017, have both). The logarithmic barrier's minimum for a weight t 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -18,9 +19,9 @@ from tenbaud.bounds.linear import Matrix
 ACCURACY = 1e-10
 WEIGHT_GROWTH = 12.0
 NEWTON_STEPS_MAX = 80
-DECREMENT = 1e-7
+DECREMENT = 1e-14
 QUADRATIC = 1e-2
-"""decrement below which a full step gains: one that does not has met the rounding of the value"""
+"""decrement below which full steps converge; the value is too coarse to choose a length by"""
 HALVINGS_MAX = 60
 
 
@@ -121,7 +122,7 @@ class _Barrier(NamedTuple):
 
 def _centre(barrier: _Barrier, point: Matrix, weight: float) -> Matrix:
     """Return the barrier's minimum for one weight: damped Newton steps."""
-    here = barrier.at(point, weight)
+    here, before = barrier.at(point, weight), math.inf
     for _ in range(NEWTON_STEPS_MAX):
         # Scaled to a unit diagonal, so that directions of very different curvature all count.
         sizes = np.sqrt(np.diag(here.hessian))
@@ -131,8 +132,18 @@ def _centre(barrier: _Barrier, point: Matrix, weight: float) -> Matrix:
         if decrement < DECREMENT:
             return point
         direction = np.tensordot(step, barrier.basis, 1)
+        if decrement < QUADRATIC:
+            if decrement > 0.25 * before:
+                return point
+            before = decrement
+            there = point + direction
+            after = barrier.at(there, weight)
+            if not np.isfinite(after.value):
+                return point
+            point, here = there, after
+            continue
         length = 1.0
-        for _ in range(HALVINGS_MAX if decrement > QUADRATIC else 1):
+        for _ in range(HALVINGS_MAX):
             there = point + length * direction
             after = barrier.at(there, weight)
             if after.value <= here.value - 0.1 * length * decrement:

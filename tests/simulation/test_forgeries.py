@@ -9,7 +9,7 @@ import pytest
 from channel.protocol.bounds import Bounds
 from tests.simulation.forgeries import fly_among_forgeries, forgeries
 
-MESSAGES = 4_000
+MESSAGES = 10_000
 SOAK_MESSAGES = 1_000_000
 KINDS = ("hello", "welcome", "refuse", "symbol", "commands", "desync", "bye", "unknown", "claim")
 

@@ -24,7 +24,7 @@ from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.config.load import load_config
 from tests.channel.codec.downlink.test_machine import SCHEMES, machine, wanted
-from tests.simulation.confirmations import LINES, count_all, counted
+from tests.simulation.confirmations import BLOCK, LINES, count_all, counted
 from tests.simulation.narrow import (
     TICK_S,
     TICKS,
@@ -84,14 +84,17 @@ def test_nothing_is_confirmed_that_the_receiver_did_not_fly(faults: Faults) -> N
     assert result.confirmed > 200
 
 
-@pytest.mark.parametrize("line", ["loss 1 %", "loss 5 %", "bursts"])
-def test_in_ten_thousand_samples_nothing_wrong_is_confirmed(line: str) -> None:
-    samples = 5_000 if line == "loss 5 %" else 2_500
-    found = counted(LINES[line], 0, samples)
+@pytest.mark.parametrize(
+    ("line", "seed"),
+    [("loss 1 %", 0), ("loss 1 %", 1), ("loss 5 %", 0), ("loss 5 %", 1), ("bursts", 0)],
+)
+def test_in_a_hundred_thousand_samples_nothing_wrong_is_confirmed(line: str, seed: int) -> None:
+    """Five blocks of 20,000."""
+    found = counted(LINES[line], seed, BLOCK)
     assert found.wrong == 0
     assert found.doubted < 0.002 * found.confirmed
-    assert found.confirmed > 0.95 * samples
-    assert found.rejoins <= (0.002 * found.confirmed if line == "bursts" else 0)
+    assert found.confirmed > 0.95 * BLOCK
+    assert found.rejoins <= (0.002 * found.confirmed if line == "bursts" else 1)
 
 
 @pytest.mark.parametrize(("layout", "period"), [(Layout(2), 1), (Layout(1, 1, 2), 2), (Layout(4), 1)])

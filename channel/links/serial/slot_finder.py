@@ -8,9 +8,8 @@ that fit each other and not the schedule replaces it.
 
 The transmitter, to which down symbols come, knows the schedule: it counts from its own tick 0
 (`expect`). At the receiver it is known before the first symbol from the handshake: tick 0 lies between
-the end of the answer to its hello and `START_NS` later (`Link.start_ns`). A later hello names the
-transmitter's sample: a schedule that contradicts it is forgotten. A wrong guess anywhere here is a
-wrong or an erased symbol, which the echo covers.
+the end of the answer to its hello and `START_NS` later (`Link.start_ns`). A wrong guess anywhere here
+is a wrong or an erased symbol, which the echo covers.
 """
 
 from __future__ import annotations
@@ -24,8 +23,6 @@ from channel.protocol.terms import SlotGrid
 START_NS = 250_000_000
 """The hello is answered, the welcome travels, the transmitter begins: all within this."""
 START_SLACK_NS = 50_000_000
-HELLO_SLOTS = 3.0
-"""How far the sample of a hello may be off the schedule: the transmitter may have been held up."""
 
 RIVAL_SLOTS = 0.25
 EARLY_SLOTS = 0.5
@@ -50,10 +47,11 @@ class SlotFinder:
         self._incarnation: int | None = None
         """of the transmitter that flies"""
 
-    def answered(self, hello: Hello, answers: Iterable[Frame], asked_ns: int, now_ns: int) -> None:
-        """Note the answer to a hello that left at `asked_ns`; it is on the line until `now_ns`."""
+    def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
+        """Note the session's answer to a hello, which is on the line until `now_ns`."""
         for answer in answers:
-            if isinstance(answer, Welcome) and self._is_news(hello, asked_ns):
+            is_other = self._zero_ns is None or hello.incarnation != self._incarnation
+            if isinstance(answer, Welcome) and is_other:
                 self._incarnation, self._zero_ns = hello.incarnation, None
                 self._rivals.clear()
                 ahead = answer.first_sample - hello.sample if hello.sample else 0
@@ -65,15 +63,6 @@ class SlotFinder:
     def expect(self, line_delay_ns: int = 0) -> None:
         """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
         self._zero_ns = self._grid.due_ns(0) + line_delay_ns // 2
-
-    def _is_news(self, hello: Hello, asked_ns: int) -> bool:
-        """Return whether the schedule is not that of the transmitter that asks."""
-        if self._zero_ns is None or hello.incarnation != self._incarnation:
-            return True
-        count = self._grid.slots
-        place = (asked_ns - self._zero_ns + self._grid.delivery_ns) / self._slot_ns
-        ahead = hello.sample * count - place
-        return hello.sample > 0 and not -HELLO_SLOTS <= ahead <= count + HELLO_SLOTS
 
     def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> LocatedSymbol:
         """Return a symbol byte that came at `now_ns` with its slot; `expected` is not settled yet."""

@@ -82,7 +82,7 @@ def test_when_a_parameter_of_the_model_differs_by_a_millionth_then_the_probe_dif
 
 
 def test_when_the_model_has_no_inputs_then_it_can_be_probed() -> None:
-    small = replace(CHUA_ZOOM, initial_range=0.05)
+    small = CHUA_ZOOM._replace(initial_range=0.05)
     assert len(numerics_probe(Codec(ChuaModel(CHUA_TICK_S), ZoomCoder(small), 2))) == 8
 
 

@@ -23,7 +23,7 @@ class Line:
 
     def __init__(self, start_ns: int = START_NS, allowance_ns: int = 20 * MS) -> None:
         self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns).up_grid)
-        self.finder.answered(Hello(5, "", b"", b""), [Welcome(77, 0, 0, 5)], 0, 0)
+        self.finder.answered(Hello(5, "", b"", b""), [Welcome(77, 0, 0, 5)], 0)
         self.start_ns = start_ns
         self.allowance_ns = allowance_ns
         self.expected = 0
@@ -82,21 +82,16 @@ def test_when_the_grid_is_known_then_down_symbols_are_placed_from_the_first_one_
             assert not finder.find(ShortSymbol(0, noise, MODULUS), 0, came_ns + MS).in_time
 
 
-@pytest.mark.parametrize("off_slots", [0, MODULUS])
-def test_when_a_request_names_another_sample_than_the_schedule_then_it_is_begun_anew(
-    off_slots: int,
-) -> None:
+def test_when_no_symbol_was_placed_then_the_next_request_says_where_the_first_one_is() -> None:
     line = Line()
-    for slot in range(3):
-        line.hear(slot, line.due_ns(slot + off_slots))  # it began late: all are taken for later ones
-    assert line.expected == 3 + off_slots
-    for request, sample in enumerate((12, 40), 1):
-        asked_ns = line.due_ns(sample + off_slots) - 90 * MS
-        again = Hello(5, "", b"", b"", request, sample=sample)
-        line.finder.answered(again, [Welcome(77, request, sample + 1, 5, request)], asked_ns, asked_ns)
-        line.expected, line.anchor = sample + 1, None
-        for slot in range(sample + 1, sample + 9):
-            assert line.hear(slot, line.due_ns(slot + off_slots)).slot == slot
+    late_ns = 6 * SLOT_NS  # the transmitter began later than its receiver takes for possible
+    assert line.hear(0, line.due_ns(0) + late_ns).slot is None
+    asked_ns = line.due_ns(40) + late_ns - 90 * MS
+    again = Hello(5, "", b"", b"", 1, sample=40)
+    line.finder.answered(again, [Welcome(77, 1, 41, 5, 1)], asked_ns)
+    line.expected = 41
+    for slot in range(41, 60):
+        assert line.hear(slot, line.due_ns(slot) + late_ns).slot == slot
 
 
 @pytest.mark.parametrize("first", [1, 3, 7, 8, 9, 20])

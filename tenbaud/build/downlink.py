@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.downlink.coded import CodedCommands, CodedDirection
@@ -19,7 +19,7 @@ from channel.codec.downlink.machine import TwoWay
 from channel.codec.downlink.mirrored import Law, MirroredLaw
 from channel.codec.laws import FeedbackLaw
 from channel.line.impairments import parse_impairments
-from channel.protocol.terms import Terms
+from channel.protocol.terms import Rung, Terms
 from receiver.controllers.base import Controller
 from receiver.controllers.pid import PidLoops
 from receiver.controllers.state_feedback import StateFeedback
@@ -83,7 +83,6 @@ def build_two_way(
     if not terms.is_narrow:
         return BuiltDownlink(None, None)
     with config_errors("the narrow downlink"):
-        _require_own_fields(config, terms.is_mirrored)
         layout = _layout(config.downlink, terms)
         build = _mirrored if terms.is_mirrored else _coded
         scheme, description = build(config, codec, terms, layout, parts or Parts())
@@ -114,10 +113,17 @@ def said_by_words(two_way: TwoWay | None) -> dict[int, tuple[float, float]]:
     return {one.output: (one.low, one.high) for one in ranges}
 
 
-def _require_own_fields(config: FlightConfig, is_mirrored: bool) -> None:
-    """Raise ConfigError for a field of the other scheme, which would change nothing."""
-    section, fields = config.downlink, DownlinkSection.model_fields
-    flown, other = ("mirrored", "coded") if is_mirrored else ("coded", "mirrored")
+def require_effect(config: FlightConfig, terms: Terms) -> None:
+    """Raise ConfigError for a setting of the downlink that is misplaced and would change nothing."""
+    link, section, fields = config.link.downlink, config.downlink, DownlinkSection.model_fields
+    if link in get_args(Rung):
+        raise ConfigError(
+            f"link.downlink = {link!r}: it names the link of the commands; what comes down it is "
+            f"channel.downlink = {link!r}"
+        )
+    if not terms.is_narrow:
+        return
+    flown, other = ("mirrored", "coded") if terms.is_mirrored else ("coded", "mirrored")
     unused = [one for one in OF_SCHEME[other] if getattr(section, one) != fields[one].default]
     if unused:
         names = ", ".join(f"downlink.{one}" for one in unused)

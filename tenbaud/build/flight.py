@@ -16,7 +16,7 @@ from channel.protocol.terms import Clock, Terms
 from channel.registry import RegistryError
 from receiver.controllers.base import Controller
 from tenbaud.build.codec import build_codec
-from tenbaud.build.downlink import build_two_way, narrowed_terms
+from tenbaud.build.downlink import build_two_way, narrowed_terms, require_effect
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import longest_period_s
@@ -101,8 +101,13 @@ class Agreement:
         return start if start < self.flight_ticks else 0
 
 
-def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agreement:
-    """Return codec, terms and identity of a configuration; ConfigError where they make no flight."""
+def agree(
+    config: FlightConfig, clock: Clock, parts: Parts | None = None, *, recorded: bool = False
+) -> Agreement:
+    """Return codec, terms and identity of a configuration; ConfigError where they make no flight.
+
+    `recorded`: of a flight that was flown, whose settings may have had no effect.
+    """
     parts = parts or Parts()
     if clock == "virtual" and config.transmitter.rig in REAL_RIGS:
         raise ConfigError(
@@ -112,6 +117,8 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
     with config_errors():
         codec = build_codec(config, parts)
         terms = checked_terms(config, codec, clock, parts.controller)
+        if not recorded:
+            require_effect(config, terms)
         two_way, described = build_two_way(config, codec, terms, parts)
     shared = config.shared_json(terms.lead_ticks, described)
     identity = Identity(software_version(), shared, numerics_probe(codec, two_way))

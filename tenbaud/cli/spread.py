@@ -10,7 +10,6 @@ from copy import copy
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache, cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
@@ -84,7 +83,7 @@ def _hint(name: str, hint: Any, default: Any, texts: dict[str, str]) -> Any:
 
 def _texts(kind: type) -> dict[str, str]:
     """Return the text below each field of a class."""
-    body = _bodies(getattr(sys.modules[kind.__module__], "__file__", None)).get(kind.__name__, [])
+    body = _bodies(kind.__module__).get(kind.__name__, [])
     return {
         field.target.id: " ".join(text.value.value.split())
         for field, text in pairwise(body)
@@ -95,7 +94,10 @@ def _texts(kind: type) -> dict[str, str]:
 
 
 @cache
-def _bodies(file: str | None) -> dict[str, list[ast.stmt]]:
-    """Return the statements of each class of a module."""
-    tree = ast.parse(Path(file).read_text(encoding="utf-8")) if file else ast.Module([], [])
-    return {one.name: one.body for one in tree.body if isinstance(one, ast.ClassDef)}
+def _bodies(module: str) -> dict[str, list[ast.stmt]]:
+    """Return the statements of each class of a module; none of one without its source."""
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except (OSError, TypeError):
+        source = ""
+    return {one.name: one.body for one in ast.parse(source).body if isinstance(one, ast.ClassDef)}

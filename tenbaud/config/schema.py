@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_validator
 
@@ -267,15 +267,6 @@ class LinkSection(Section):
     """for a kind from an installed package"""
     impairments: str = ""
     """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": simulated impairments of the line"""
-
-    @field_validator("downlink")
-    @classmethod
-    def _place(cls, value: str) -> str:
-        if value in get_args(Rung):
-            raise ValueError(
-                f"it names the link of the commands; what comes down it is channel.downlink = {value!r}"
-            )
-        return value
 
     @field_validator("impairments")
     @classmethod

@@ -89,6 +89,8 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
         with whole_path(target) as part:
             with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as whole:
                 rows, last_ns = _copy(stream, whole)
+                whole.flush()
+                os.fsync(whole.fileno())  # where there is no room, the damaged file keeps its name
             part.chmod(os.fstat(damaged.fileno()).st_mode & 0o777)
             if kept is not None:
                 _keep(path, kept, damaged)
@@ -97,7 +99,7 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
 
 @contextlib.contextmanager
 def _held(path: Path) -> Iterator[BinaryIO]:
-    """Open a recording that nobody writes and that is no link; it stays locked within the `with`."""
+    """Open a recording that no flight writes and that is no link; it is locked until it is closed."""
     if path.is_symlink():
         raise RecordingError(
             f"{path} is a link, and recover follows none: it would replace what the link leads to. "

@@ -23,6 +23,8 @@ LINE_C = "#d9730d"
 FAINT = "#8a8a8a"
 POINTS = 3000
 FIGURE_FORMATS = (".png", ".svg", ".pdf")
+UNWRITTEN = {"png": "Software", "svg": "Date", "svgz": "Date", "pdf": "CreationDate"}
+"""Left out of a file of these formats: the same data give the same file."""
 
 
 def new_figure(
@@ -64,10 +66,10 @@ def decimated(times: Series, values: Series) -> tuple[Series, Series]:
 def save(figure: Figure, paths: Sequence[Path], dots_per_inch: int = 100) -> None:
     """Write the figure to each path; the ending says in which format."""
     for path in paths:
-        # A fixed salt and no date: the same data give the same file.
-        unwritten = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix, "Software")
+        style: dict[str, Any] = {"format": path.suffix[1:].lower() or "png"}
+        if style["format"] in UNWRITTEN:
+            style["metadata"] = {UNWRITTEN[style["format"]]: None}
         with whole_file(path) as stream:
-            style: dict[str, Any] = {"metadata": {unwritten: None}, "format": path.suffix[1:] or "png"}
             figure.savefig(stream, dpi=dots_per_inch, **style)
 
 

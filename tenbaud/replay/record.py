@@ -79,7 +79,7 @@ def agree_again(config: FlightConfig, clock: str, allow_code: bool) -> Agreement
     config = config.allowing_code() if allow_code else config
     require_allowed(config)
     require_regular_files(config)
-    return agree(config, "real" if clock == "real" else "virtual")
+    return agree(config, "real" if clock == "real" else "virtual", recorded=True)
 
 
 def _with_files_of(folder: Path, config: FlightConfig) -> FlightConfig:

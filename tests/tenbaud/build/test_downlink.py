@@ -27,6 +27,7 @@ from tenbaud.build.recorded import flight_config
 from tenbaud.build.references import build_references
 from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.flight.fly import fly
+from tenbaud.replay.record import agree_again
 from tenbaud.telemetry.end import steered
 from tests.tenbaud.build import own_laws
 
@@ -221,6 +222,10 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
             {"downlink__scheme": "coded", "downlink__bits": 8},
             r'downlink\.bits: only for the scheme "mirrored"; .* set downlink\.scheme = "mirrored"',
         ),
+        (
+            {"link__downlink": "narrow"},
+            r"link of the commands; what comes down it is channel\.downlink = 'narrow'",
+        ),
         ({"timing__lead_ticks": 7, "downlink__scheme": "coded"}, "need lead_ticks >= 8"),
         ({"downlink__scheme": "coded", "downlink__directions": [[1.0]]}, r"1 row\(s\) of 1 numbers"),
         ({"downlink__scheme": "coded", "downlink__feedback": [[1.0]]}, r"downlink\.feedback has 1 row"),
@@ -257,6 +262,12 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
 def test_what_cannot_be_flown_is_refused_with_the_numbers(changes: dict[str, Any], what: str) -> None:
     with pytest.raises(ConfigError, match=what):
         agreed(**changes)
+
+
+def test_a_recorded_flight_keeps_its_settings_without_effect() -> None:
+    changes = {"channel": {"downlink": "narrow"}, "downlink": {"range_max": 0.7}}
+    config = load_config("tuned-10baud", None, changes | {"link": {"downlink": "narrow"}})
+    assert agree_again(config, "virtual", allow_code=False).identity == agreed().identity
 
 
 def test_a_law_from_outside_is_mirrored_where_it_keeps_to_the_rules() -> None:

@@ -77,7 +77,6 @@ def test_when_the_kind_is_repeated_then_the_preset_s_fields_stay() -> None:
         ({"model": {"kind": "pich"}}, "model.kind = 'pich': known are pitch, hold"),
         ({"coder": {"windw_signs": 3}}, "coder.windw_signs: unknown field; did you mean window_signs"),
         ({"downlink": "narrow"}, r"a section with the fields scheme, .* mean channel\.downlink or"),
-        ({"link": {"downlink": "narrow"}}, r"link of the commands; .* is channel\.downlink = 'narrow'"),
         ({"coder": {"kind": "fixed", "window_signs": 3}}, "coder.window_signs: unknown field"),
         ({"coder": {"decay": 2.0}}, "coder.decay = 2.0"),
     ],

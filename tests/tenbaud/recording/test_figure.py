@@ -9,6 +9,7 @@ from tenbaud import fly as fly_once
 from tenbaud.flight.report import draw_figure
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.style import new_figure, save
 from tests.tenbaud.recording.rows import EVENT, Rows
 
 
@@ -49,3 +50,10 @@ def test_when_both_estimates_are_one_then_the_legend_names_no_curve_that_is_hidd
     labels = [[text.get_text() for text in legend.get_texts()] for legend in legends]
     assert labels[0][2:] == curves
     assert labels[1] == [f"error of the {curve}" for curve in curves]
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.tif", "a.svgz", "a.SVG", "a.pdf", "a.eps", "a"])
+def test_a_figure_is_written_in_every_format_of_matplotlib(tmp_path: Path, name: str) -> None:
+    figure, _ = new_figure(1)
+    save(figure, [tmp_path / name])
+    assert (tmp_path / name).stat().st_size > 500

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
@@ -40,6 +41,24 @@ def whole_rows(path: Path) -> int:
         assert summary is not None
         assert summary.statistics is not None
         return summary.statistics.message_count
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_when_the_disk_turns_out_to_be_full_then_the_damaged_file_is_where_it_was(
+    flight: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    cut = tmp_path / "transmitter.mcap"
+    cut.write_bytes(flight.folder.transmitter.read_bytes()[:100_000])
+    monkeypatch.setattr(os, "fsync", full)
+    if not links:
+        monkeypatch.setattr(Path, "hardlink_to", full)
+    with pytest.raises(WriteError, match="No space left"):
+        recover(cut)
+    assert list(tmp_path.iterdir()) == [cut]
+    assert cut.stat().st_size == 100_000
 
 
 @pytest.mark.parametrize("links", [True, False])

@@ -124,6 +124,10 @@ def _centre(barrier: _Barrier, point: Matrix, weight: float) -> Matrix:
     """Return the barrier's minimum for one weight: damped Newton steps."""
     here, before = barrier.at(point, weight), math.inf
     for _ in range(NEWTON_STEPS_MAX):
+        if not np.isfinite(here.hessian).all():
+            raise ValueError(
+                "the floor cannot be computed: numbers of this plant at this rate overflow"
+            )
         # Scaled to a unit diagonal, so that directions of very different curvature all count.
         sizes = np.sqrt(np.diag(here.hessian))
         scaled = here.hessian / np.outer(sizes, sizes)

@@ -32,6 +32,7 @@ QUADRATURE_POINTS = 12
 SCALINGS = 2
 STARTING = (0.25, 0.75)
 """of what the rate has above the smallest: where the search for a floor may start"""
+STARTS_MAX = 300
 
 
 class RateTooLow(ValueError):
@@ -185,7 +186,7 @@ def _between(
 ) -> Matrix:
     """Return the covariance at a gain whose rate is well between two; the rate rises with the gain."""
     step = 1.0
-    while True:
+    for _ in range(STARTS_MAX):
         rate, covariance = at(log_gain)
         share = (rate - least) / (most - least)
         if STARTING[0] < share < STARTING[1]:
@@ -193,6 +194,7 @@ def _between(
         # Smaller steps once the rate has been passed.
         step = step if (share < STARTING[0]) == (step > 0.0) else -0.5 * step
         log_gain += step
+    raise ValueError("the floor cannot be computed: no filter of this plant is near this rate")
 
 
 class _Flow:

@@ -155,7 +155,8 @@ def run_page(inner: Any, access: Access, address: Address, *, open_browser: bool
     )
     with ExitStack() as stack:
         shown = stack.enter_context(open_privately()) if open_browser else None
-        asyncio.run(_serve(uvicorn.Server(config), _first_look(address.url, access, shown)))
+        runner = stack.enter_context(asyncio.Runner(loop_factory=config.get_loop_factory()))
+        runner.run(_serve(uvicorn.Server(config), _first_look(address.url, access, shown)))
 
 
 async def _serve(server: Any, first_look: Coroutine[Any, Any, None]) -> None:

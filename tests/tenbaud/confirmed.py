@@ -29,9 +29,12 @@ def check_flown(summary: Summary, samples: int, receiver: Summary | None = None,
         assert summary["commands_late"] > 0
         assert summary["digest_checks"] < samples
         return
-    assert summary["digest_checks"] == summary["samples"] == samples
+    flown = summary["samples"]
+    assert summary["digest_checks"] == flown >= samples
+    if flown > samples:  # held up at its end: the receiver, by its own clock, went on meanwhile
+        assert summary["ticks_missed"] > 0
     unsent = summary["words_missed"] + summary["symbols_refused"]
-    symbols = samples * bits - unsent
+    symbols = flown * bits - unsent
     assert summary["coder_bits_up"] == symbols, "one bit for each symbol that was sent"
     if summary["link"] != "serial":  # a byte that is late by several slots may be taken for another's
         assert summary["erasures"] == unsent + (receiver or summary)["symbols_late"]

@@ -199,7 +199,7 @@ def _flight(stack: ExitStack, ticks_per_sample: int, record: bool) -> Ping:
         if session.confirmed_state.sample != sample:
             raise RuntimeError(f"the echo of sample {sample - 1} did not come with the answer")
         session.command(tick + ticks_per_sample)
-        session.confirmed.clear()
+        session.following.take_confirmed()
         return took_ns
 
     return ping

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple, TypeAlias
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
@@ -67,6 +68,15 @@ class _Unwritten(NamedTuple):
     now_ns: int
 
 
+@contextmanager
+def divergence(sample: int) -> Iterator[None]:
+    """Within the `with` the estimate is advanced: its errors of arithmetic are a CodecDiverged."""
+    try:
+        yield
+    except (ArithmeticError, ValueError) as error:
+        raise CodecDiverged(f"the estimate diverged in sample {sample}: {error}") from error
+
+
 class Commander(ABC):
     """Flies samples; see the module's text."""
 
@@ -109,7 +119,7 @@ class Commander(ABC):
 
     @abstractmethod
     def _fly(self, word: Word, session: int, epoch: int) -> Flown:
-        """Consume the word of the next sample; ArithmeticError or ValueError where it cannot."""
+        """Consume the word of the next sample; CodecDiverged where it cannot."""
 
     @property
     def first_problem(self) -> str:
@@ -133,10 +143,7 @@ class Commander(ABC):
     def fly(self, word: Word, session: int, epoch: int, now_ns: int) -> list[Frame]:
         """Consume the word of the next sample; return the frames to send for it."""
         before = self.state
-        try:
-            flown = self._fly(word, session, epoch)
-        except (ArithmeticError, ValueError) as error:
-            raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
+        flown = self._fly(word, session, epoch)
         self.history.add(epoch, word, self.state)
         self._unwritten.append(_Unwritten(before, word, flown, now_ns))
         if len(self._unwritten) >= UNWRITTEN_MAX:
@@ -215,7 +222,8 @@ class EchoCommander(Commander):
     def _fly(self, word: Word, session: int, epoch: int) -> Flown:
         sample = self._state.sample
         self._steps = []
-        flown = self._flown(word)
+        with divergence(sample):
+            flown = self._flown(word)
         self._commands.extend(flown.commands)
         for _ in range(len(self._commands) - self.terms.lead_ticks):
             self._commands.popleft()

@@ -15,7 +15,7 @@ from channel.protocol.frames import DownSymbol, Frame
 from channel.protocol.recording import Recorder, write_epoch, write_two_way
 from channel.protocol.terms import Terms
 from receiver.session.asking import Asker
-from receiver.session.commander import Begins, Commander, Flown, Standing, Start
+from receiver.session.commander import Begins, Commander, Flown, Standing, Start, divergence
 from receiver.session.rejoin import KEEP_CODER_SAMPLES
 
 
@@ -85,7 +85,8 @@ class NarrowCommander(Commander):
 
     def _fly(self, word: Word, session: int, epoch: int) -> Flown:
         before = self.two_way_state
-        one, symbols = self.machine.fly(before, word, self._wanted)
+        with divergence(before.sample):
+            one, symbols = self.machine.fly(before, word, self._wanted)
         after = self.two_way_state = one.state
         slots = enumerate(symbols, before.sample * len(symbols))
         frames: list[Frame] = [DownSymbol(session, epoch, *numbered) for numbered in slots]

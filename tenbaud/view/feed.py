@@ -78,7 +78,7 @@ class Feed:
                 endpoints = tuple(found_endpoints())
         for endpoint in endpoints:
             if endpoint not in self._open and not self._ending.is_set():
-                with suppress(LinkError):  # nobody there yet, or any more
+                with suppress(LinkError):  # no sender there yet, or any more
                     self._open[endpoint] = TelemetryFeed(
                         endpoint, self._session_name, self._messages.append, self._credentials
                     )

@@ -12,7 +12,7 @@ from channel.codec.codec import Vector
 from channel.codec.signals import STEPS_MAX, InputSignal, Signals, named
 from channel.protocol.limits import COMMAND_MAX, per_input
 from plant_sim.zero_order_hold import continuous
-from tenbaud.config.load import OWN, ConfigError, load_config
+from tenbaud.config.load import OWN, ConfigError, config_errors, load_config
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import EncoderSection
 from tenbaud.design.complete import checked_section
@@ -88,10 +88,8 @@ def _rate(rate_baud: float | None, over: Mapping[str, Any]) -> float:
 def _per_input(most: float | Vector, model: Mapping[str, Any], inputs: int) -> Vector:
     names = model.get("inputs") or [one.name for one in named("input", inputs)]
     signals = Signals((), tuple([InputSignal(name) for name in names]), ())
-    try:
+    with config_errors():
         return per_input("limits.command_max", most, signals)
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
 
 
 def exact_outputs(model: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from plant_sim.dynamics import FunctionPlant
 from plant_sim.linear import SimulatedLinear
 from plant_sim.plant import Plant, PlantContext
 from plant_sim.zero_order_hold import continuous
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import config_errors
 from tenbaud.design.systems import Matrices, matrices, state_space
 
 SUBSTEP = 0.2
@@ -30,13 +30,11 @@ def system_plant(system: Any, context: PlantContext) -> Plant:
     if not hasattr(system, "A") and model.get("operating_state"):
         point = (model["operating_state"], model["operating_command"])
     found = matrices(system, point)
-    try:
+    with config_errors(f"the plant ({type(system).__name__})"):
         if not found.linear:
             return _function_plant(system, found, context)
         A, B = continuous(found.A, found.B, found.dt) if found.dt else (found.A, found.B)
         return SimulatedLinear(context, A.tolist(), B.tolist(), found.C.tolist())
-    except ValueError as error:
-        raise ConfigError(f"the plant ({type(system).__name__}): {error}") from error
 
 
 def _function_plant(system: Any, found: Matrices, context: PlantContext) -> FunctionPlant:

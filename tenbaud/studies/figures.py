@@ -8,7 +8,7 @@ from typing import NamedTuple
 from channel.protocol.identity import Identity
 from tenbaud.build.codec import build_codec
 from tenbaud.build.flight import REAL_RIGS, Agreement, checked_terms
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import ConfigError, config_errors
 from tenbaud.config.schema import FlightConfig
 
 
@@ -50,9 +50,7 @@ def shared_parts(config: FlightConfig) -> Agreement:
             f"the {config.transmitter.rig} rig moves in real time and cannot be flown some hundred "
             "times: record a flight of it and replay that"
         )
-    try:
+    with config_errors():
         codec = build_codec(config)
         terms = checked_terms(config, codec, "virtual")
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
     return Agreement(config, "virtual", codec, terms, Identity("", "", b""))

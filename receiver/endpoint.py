@@ -70,7 +70,7 @@ class ReceiverEndpoint:
                 )
             frames += self._on_message(data, shown_ns)
         frames += self.session.on_deadline(shown_ns)
-        return self.downlink.offer(frames, now_ns, self.session.flight_ns(shown_ns))
+        return self.downlink.offer(frames, now_ns, lambda: self.session.flight_ns(shown_ns))
 
     def over(self, now_ns: int, peer_timeout_s: float) -> bool:
         """Return whether the flight is over; LinkLost when nothing came for too long."""

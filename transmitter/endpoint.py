@@ -145,8 +145,9 @@ class TransmitterNode:
         late = command is None and owed and not self.guard.stopped
         self.commands_late += late
         volts = self.guard.apply(tick, command, session.owing.owed_ticks(tick))
-        self.ticks_down += self.guard.stopped
-        if command is not None and not self.guard.stopped:
+        stopped = self.guard.stopped
+        self.ticks_down += stopped
+        if command is not None and not stopped:
             self.ticks_commanded += 1
             self.ticks_at_limit += session.terms.limits.reached(command)
         self.rig.write(tick, volts)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from channel.protocol.endings import Ending
 
@@ -140,8 +140,7 @@ class LocatedSymbol:
     """(slot, time in ns): where deadlines count from now on, if that has changed"""
 
 
-@dataclass(frozen=True, slots=True)
-class Echo:
+class Echo(NamedTuple):
     """The word that the receiver consumed for one sample, and the commands that it computed."""
 
     sample: int

@@ -66,6 +66,11 @@ class Loop:
     rate: Reading
 
 
+def _nothing(tick: int) -> float:
+    """Return the set-point of a loop that has none."""
+    return 0.0
+
+
 class PidLoops:
     """A `Controller`: for each loop u = kP eps + kI int(eps) - kD rate, mixed into the inputs.
 
@@ -84,6 +89,10 @@ class PidLoops:
         self.integrals = [0.0] * len(self.loops)
         """the integral term of each loop's u"""
         self._constants = tuple([loop.constants for loop in self.loops])
+        self._readings = [
+            (_nothing if loop.reference is None else loop.reference.value, loop.value, loop.rate)
+            for loop in self.loops
+        ]
         self._outputs = 1 + max([loop.output for loop in loops], default=-1)
         self._last_tick: int | None = None
 
@@ -104,11 +113,10 @@ class PidLoops:
         if self._last_tick is not None and tick <= self._last_tick:
             raise ValueError(f"tick is {tick}; it must be above the last one, {self._last_tick}")
         wanted = list(self.bias)
-        errors = [
-            (0.0 if loop.reference is None else loop.reference.value(tick)) - loop.value(state)
-            for loop in self.loops
-        ]
-        rates = [loop.rate(state) for loop in self.loops]
+        errors, rates = [], []
+        for target, value, rate in self._readings:
+            errors.append(target(tick) - value(state))
+            rates.append(rate(state))
         if not pid_command(self._constants, self.integrals, errors, rates, self.command_max, wanted):
             raise ValueError(f"state at tick {tick} is {state}; it must be finite")
         self._last_tick = tick

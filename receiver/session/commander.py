@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
@@ -68,13 +67,13 @@ class _Unwritten(NamedTuple):
     now_ns: int
 
 
-@contextmanager
-def divergence(sample: int) -> Iterator[None]:
-    """Within the `with` the estimate is advanced: its errors of arithmetic are a CodecDiverged."""
-    try:
-        yield
-    except (ArithmeticError, ValueError) as error:
-        raise CodecDiverged(f"the estimate diverged in sample {sample}: {error}") from error
+CANNOT_ADVANCE = (ArithmeticError, ValueError)
+"""The exceptions of an estimate that cannot be advanced."""
+
+
+def diverged(sample: int, error: Exception) -> CodecDiverged:
+    """Return the exception to raise for an estimate that could not be advanced in this sample."""
+    return CodecDiverged(f"the estimate diverged in sample {sample}: {error}")
 
 
 class Commander(ABC):
@@ -222,8 +221,10 @@ class EchoCommander(Commander):
     def _fly(self, word: Word, session: int, epoch: int) -> Flown:
         sample = self._state.sample
         self._steps = []
-        with divergence(sample):
+        try:
             flown = self._flown(word)
+        except CANNOT_ADVANCE as error:
+            raise diverged(sample, error) from error
         self._commands.extend(flown.commands)
         for _ in range(len(self._commands) - self.terms.lead_ticks):
             self._commands.popleft()

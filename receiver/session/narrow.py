@@ -15,7 +15,15 @@ from channel.protocol.frames import DownSymbol, Frame
 from channel.protocol.recording import Recorder, write_epoch, write_two_way
 from channel.protocol.terms import Terms
 from receiver.session.asking import Asker
-from receiver.session.commander import Begins, Commander, Flown, Standing, Start, divergence
+from receiver.session.commander import (
+    CANNOT_ADVANCE,
+    Begins,
+    Commander,
+    Flown,
+    Standing,
+    Start,
+    diverged,
+)
 from receiver.session.rejoin import KEEP_CODER_SAMPLES
 
 
@@ -85,8 +93,10 @@ class NarrowCommander(Commander):
 
     def _fly(self, word: Word, session: int, epoch: int) -> Flown:
         before = self.two_way_state
-        with divergence(before.sample):
+        try:
             one, symbols = self.machine.fly(before, word, self._wanted)
+        except CANNOT_ADVANCE as error:
+            raise diverged(before.sample, error) from error
         after = self.two_way_state = one.state
         slots = enumerate(symbols, before.sample * len(symbols))
         frames: list[Frame] = [DownSymbol(session, epoch, *numbered) for numbered in slots]

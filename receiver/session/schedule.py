@@ -52,6 +52,7 @@ class Schedule:
         self._terms = terms
         self._grid = terms.up_grid
         self._slot_ns = self._grid.length_ns
+        self._largest_ns = round(self._slot_ns)
         self._early_ns = EARLY_SAMPLES * terms.sample_ns + terms.deadline_allowance_ns
         self._zero_ns = 0
         """when slot 0 was, or would have been, due"""
@@ -97,7 +98,7 @@ class Schedule:
             self._zero_ns = zero_ns
         off_ns = zero_ns - self._zero_ns
         early = -off_ns > self._terms.deadline_allowance_ns
-        largest_ns = round(self._slot_ns)
+        largest_ns = self._largest_ns
         self._zero_ns += round(GAIN * max(-largest_ns, min(largest_ns, off_ns)))
         self._heard_ns = now_ns
         self._is_guess = False
@@ -132,16 +133,15 @@ class SlotClock:
         """settled by their deadlines since the last symbol"""
         self._terms = terms
         self._gap_slots_max = terms.history_samples * terms.symbols_per_word
-        self._anchor: tuple[int, int] | None = None
+        self._zero_deadline_ns: int | None = None
+        """deadline of slot 0, if it had one"""
 
     @property
     def deadline_ns(self) -> int | None:
         """Return when the next slot is taken for erased; None: not by the clock."""
-        if self._anchor is None:
+        if self._zero_deadline_ns is None:
             return None
-        slot, time_ns = self._anchor
-        due_ns = self._terms.slot_ns(self.slot) - self._terms.slot_ns(slot)
-        return time_ns + due_ns + self._terms.deadline_allowance_ns
+        return self._zero_deadline_ns + self._terms.slot_ns(self.slot)
 
     @property
     def is_silent(self) -> bool:
@@ -154,7 +154,11 @@ class SlotClock:
 
     def anchor(self, at: tuple[int, int] | None) -> None:
         """Count deadlines from this (slot, time), or from nothing any more."""
-        self._anchor = at
+        self._zero_deadline_ns = None
+        if at is not None:
+            slot, time_ns = at
+            allowed_ns = time_ns + self._terms.deadline_allowance_ns
+            self._zero_deadline_ns = allowed_ns - self._terms.slot_ns(slot)
 
     def take(self, slot: int) -> Iterator[int]:
         """Settle the slots before that of a symbol, yielding each, and then its own, unyielded."""

@@ -359,7 +359,8 @@ class ReceiverSession:
         whole = len(symbols) == len(self._word)
         self._word = []
         word = tuple(symbols) if whole else ERASED
-        self.counts.update(samples=1, erasures=int(not whole))
+        self.counts["samples"] += 1
+        self.counts["erasures"] += not whole
         return self._commander.fly(word, self.session_number, self.epoch, now_ns)
 
     # Ends and reports

@@ -39,7 +39,7 @@ from tenbaud.flight.trouble import Trouble
 from tenbaud.flight.viewing import ENDS, Views, viewed
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
-from tenbaud.recording.overview import OverviewRecorder
+from tenbaud.recording.overview import OverviewRecorder, is_long
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences.flown import Summary
@@ -235,8 +235,9 @@ def open_recorder(
     }
     if notes := replay_notes(agreement.config):
         metadata["flight_log_notes"] = "\n".join(notes)
-    # Of many rigs no figures are drawn at the end.
-    overview = OverviewRecorder(plant) if writer is None else None
+    # Of many rigs no figures are drawn at the end. A receiver is not informed of the flight's length.
+    is_gathered = writer is None and (role == "receiver" or is_long(agreement.flight_ticks))
+    overview = OverviewRecorder(plant) if is_gathered else None
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
     wait = agreement.clock == "virtual"
     return McapRecorder(path, metadata, wait_when_full=wait, shared=writer, overview=overview)

@@ -26,6 +26,8 @@ PENDING_MAX = 50_000
 
 ROWS_OF_LONG_FLIGHT = 300_000
 """A recording of fewer rows is read again in a second or two."""
+ROWS_PER_TICK_MAX = 3
+"""What a transmitter records of a tick, of its estimate and of its sample."""
 BLOCK_ROWS = 512
 """Rows of one topic that are kept as they are, until they are added in one go."""
 
@@ -245,6 +247,11 @@ def unpacked(metadata: Mapping[str, str], plant: Signals) -> Overview | None:
     except (KeyError, ValueError, TypeError):
         return None
     return overview
+
+
+def is_long(flight_ticks: int) -> bool:
+    """Return whether a transmitter that flies so long may record a long flight."""
+    return ROWS_PER_TICK_MAX * flight_ticks >= ROWS_OF_LONG_FLIGHT
 
 
 class OverviewRecorder:

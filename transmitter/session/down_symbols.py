@@ -237,11 +237,9 @@ class NarrowFollowing:
         self._confirmed.append(_Done(done, live))
         self.history.add(self._epoch, done.word, done.flown.state.codec)
         hashes = done.heard[self.machine.commands_in(done.before) :]
-        parts.counts.update(
-            confirmed=1,
-            erasures=done.word is ERASED,
-            hash_symbols=len(hashes) - hashes.count(None),
-        )
+        parts.counts["confirmed"] += 1
+        parts.counts["erasures"] += done.word is ERASED
+        parts.counts["hash_symbols"] += len(hashes) - hashes.count(None)
         parts.owing.on_confirmed()
         self._steers = True
         delay = tick // terms.ticks_per_sample - done.sample

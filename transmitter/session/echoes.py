@@ -34,6 +34,7 @@ class EchoFollowing:
         self._compared: CodecState | None = None
         """last state found equal to the receiver's"""
         self._epoch = 0
+        self._lag_max = terms.history_samples
 
     @property
     def confirmed_state(self) -> CodecState:
@@ -74,9 +75,9 @@ class EchoFollowing:
 
     def at_tick(self, tick: int) -> Lost | None:
         terms = self._parts.terms
-        sample, lag_max = tick // terms.ticks_per_sample, terms.history_samples
-        if sample - self.copies.confirmed.sample > lag_max:
-            return Lost(Why.LAG, replace(ASKED, number=lag_max))
+        sample = tick // terms.ticks_per_sample
+        if sample - self.copies.confirmed.sample > self._lag_max:
+            return Lost(Why.LAG, replace(ASKED, number=self._lag_max))
         if lost := self._check_gap(tick):
             return lost
         self._parts.counts["words_missed"] += self.copies.skip_to(sample)
@@ -136,7 +137,10 @@ class EchoFollowing:
         self._confirmed.append(done)
         self.history.add(self._epoch, word, done.flown.state)
         checked, erased, unsent = echo.digest_mask > 0, word is ERASED, done.lag_samples == 0
-        counts.update(confirmed=1, digest_checks=checked, erasures=erased, words_missed=unsent)
+        counts["confirmed"] += 1
+        counts["digest_checks"] += checked
+        counts["erasures"] += erased
+        counts["words_missed"] += unsent
         if done.digest != done.peer_digest:
             return Lost(Why.DESYNC, replace(ASKED, sample=done.sample), done)
         # Only now: a receiver with a different state must move no motor.

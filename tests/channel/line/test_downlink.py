@@ -83,11 +83,11 @@ def test_when_the_clock_is_real_then_symbols_wait_for_their_slots() -> None:
     downlink = Downlink(DATAGRAM, CleanLine(3 * MS), narrow())
     first, second = (encode(one) for one in word(1))
     now_ns = 5_000 * MS
-    assert downlink.offer(word(1), now_ns, 110 * MS) == []
+    assert downlink.offer(word(1), now_ns, lambda: 110 * MS) == []
     assert downlink.next_due_ns == now_ns + 13 * MS
-    assert downlink.offer([], now_ns + 13 * MS, 123 * MS) == [first]
+    assert downlink.offer([], now_ns + 13 * MS, lambda: 123 * MS) == [first]
     assert downlink.next_due_ns == now_ns + 63 * MS
-    assert downlink.offer([], now_ns + 63 * MS, 173 * MS) == [second]
+    assert downlink.offer([], now_ns + 63 * MS, lambda: 173 * MS) == [second]
 
 
 def test_when_bits_are_delivered_at_the_end_of_their_slots_then_they_arrive_a_slot_later() -> None:

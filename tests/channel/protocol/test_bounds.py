@@ -49,7 +49,7 @@ def packed(sample: int = SAMPLE, **changes: float) -> bytes:
 
 
 def echo(sample: int = SAMPLE, **changes: Any) -> Echo:
-    return replace(Echo(sample, 1, 0, VOLTS), **changes)
+    return Echo(sample, 1, 0, VOLTS)._replace(**changes)
 
 
 def test_when_frames_are_what_the_other_end_sends_then_they_are_within_bounds() -> None:

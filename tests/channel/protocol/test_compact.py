@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from binascii import crc_hqx
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -59,8 +58,8 @@ def test_when_a_frame_comes_within_half_a_turn_of_the_clock_then_it_says_what_wa
     assert (got.session, got.epoch) == (SESSION, EPOCH)
     # Of the newest 16 bits of the digest and, 1000 being 8 modulo 16, bits 40 to 42; else none.
     *repeated, newest = got.echoes
-    assert newest == replace(echoes[-1], digest=0x100_0000_ABCD, digest_mask=0x700_0000_FFFF)
-    assert repeated == [replace(one, digest=0, digest_mask=0) for one in echoes[:-1]]
+    assert newest == echoes[-1]._replace(digest=0x100_0000_ABCD, digest_mask=0x700_0000_FFFF)
+    assert repeated == [one._replace(digest=0, digest_mask=0) for one in echoes[:-1]]
 
 
 def test_when_an_alphabet_is_large_and_a_word_long_then_every_word_and_the_erasure_pass() -> None:

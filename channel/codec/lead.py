@@ -70,6 +70,8 @@ class _Sample(NamedTuple):
     """A sample that is being flown; the lists are those of `FlownSample`."""
 
     codec: Codec
+    tick: Callable[[Vector, Vector, Vector], Vector]
+    """of the codec's model"""
     state: CodecState
     opened: OpenSample
     known: Sequence[Vector]
@@ -106,7 +108,7 @@ def _tick(
     command: Vector,
     held: Vector,
 ) -> tuple[CodecState, Vector]:
-    return closed, flight.codec.model.tick(model, command, held)
+    return closed, flight.tick(model, command, held)
 
 
 def fly_sample(
@@ -118,7 +120,8 @@ def fly_sample(
     """
     count = codec.ticks_per_sample
     opened = codec.open(state, word)
-    flight = _Sample(codec, state, opened, known, decide, state.sample * count, [], [], [])
+    first = state.sample * count
+    flight = _Sample(codec, codec.model.tick, state, opened, known, decide, first, [], [], [])
     closed = fly_ticks(
         _step,
         _close,
@@ -128,7 +131,7 @@ def fly_sample(
         opened.model,
         opened.held,
         codec.nothing_held,
-        flight.first_tick,
+        first,
         count,
         len(known),
     )

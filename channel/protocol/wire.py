@@ -152,11 +152,12 @@ def is_short(data: bytes) -> bool:
 
 def decode(data: bytes) -> Frame:
     """Return the frame in these bytes; FrameError, with the reason, for anything else."""
-    if len(data) > FRAME_BYTES_MAX:
-        raise FrameError(f"oversized: {len(data)} bytes, at most {FRAME_BYTES_MAX}")
+    size = len(data)
+    if size > FRAME_BYTES_MAX:
+        raise FrameError(f"oversized: {size} bytes, at most {FRAME_BYTES_MAX}")
     short = is_short(data)
-    if len(data) < _HEAD.size + _CRC.size and not short:
-        raise FrameError(f"truncated: {len(data)} bytes")
+    if size < _HEAD.size + _CRC.size and not short:
+        raise FrameError(f"truncated: {size} bytes")
     message, (checksum,) = data[: -_CRC.size], _CRC.unpack(data[-_CRC.size :])
     if short:
         return ShortCommands(message, checksum)

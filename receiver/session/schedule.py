@@ -124,7 +124,7 @@ class Proven(NamedTuple):
 
 
 class SlotClock:
-    """Counts the slots of an epoch. Yielded slots are final: later messages do not change them."""
+    """Counts the slots of an epoch. Settled slots are final: later messages do not change them."""
 
     def __init__(self, terms: Terms, slot: int = 0) -> None:
         self.slot = slot
@@ -160,19 +160,16 @@ class SlotClock:
             allowed_ns = time_ns + self._terms.deadline_allowance_ns
             self._zero_deadline_ns = allowed_ns - self._terms.slot_ns(slot)
 
-    def take(self, slot: int) -> Iterator[int]:
-        """Settle the slots before that of a symbol, yielding each, and then its own, unyielded."""
+    def take(self, slot: int) -> range:
+        """Settle the slot of a symbol, and those before it, which are returned."""
+        missed = range(self.slot, slot)
         self.silent_slots = 0
-        while self.slot < slot:
-            yield self._settle()
-        self._settle()
+        self.slot = slot + 1
+        return missed
 
     def expired(self, now_ns: int) -> Iterator[int]:
         """Settle the slots whose deadline has passed by now, yielding each."""
         while (deadline_ns := self.deadline_ns) is not None and deadline_ns <= now_ns:
             self.silent_slots += 1
-            yield self._settle()
-
-    def _settle(self) -> int:
-        self.slot += 1
-        return self.slot - 1
+            self.slot += 1
+            yield self.slot - 1

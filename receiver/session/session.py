@@ -138,10 +138,10 @@ class ReceiverSession:
 
     def on_frame(self, frame: Frame, now_ns: int) -> list[Frame]:
         """Take one frame that arrived at `now_ns` of this end's clock; return the frames to send."""
+        if isinstance(frame, Symbol):
+            return self._on_symbol(frame, now_ns)
         frame = within_text_bounds(frame)
         match frame:
-            case Symbol():
-                return self._on_symbol(frame, now_ns)
             case LocatedSymbol() if self.phase is Phase.FLYING:
                 return self._on_located_symbol(frame, now_ns)
             case Hello():

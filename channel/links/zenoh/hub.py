@@ -68,16 +68,16 @@ class ZenohHub:
 
         None too, at once, for a message under a name that no session can have: it is counted.
         """
-        sample = self._inbox.sample(timeout_s)
-        if sample is None:
+        found = self._inbox.sample(timeout_s)
+        if found is None:
             return None
+        sample, data = found
         key = str(sample.key_expr)
         name = self._names.get(key) or key.removeprefix(f"{KEY_ROOT}/").rpartition("/up/")[0]
         # The key is the sender's choice, and a name leads to a configuration and a folder.
         if key not in self._names and not is_session_name(name):
             self.counts.dropped["no session's name"] += 1
             return None
-        data = sample.payload.to_bytes()
         self.counts.messages_in += 1
         self.counts.bytes_in += len(data)
         return name, data

@@ -150,21 +150,21 @@ class ChannelInbox:
 
     def get(self, timeout_s: float) -> bytes | None:
         """Return the next message, or None after `timeout_s` seconds (0: only what is there)."""
-        sample = self.sample(timeout_s)
-        return None if sample is None else sample.payload.to_bytes()
+        found = self.sample(timeout_s)
+        return None if found is None else found[1]
 
-    def sample(self, timeout_s: float) -> zenoh.Sample | None:
-        """Return the next message as Zenoh has it: with its key."""
+    def sample(self, timeout_s: float) -> tuple[zenoh.Sample, bytes] | None:
+        """Return the next message as Zenoh has it, with its key, and its bytes."""
         deadline_s = 0.0
         while (sample := self._subscriber.try_recv()) is not None:
-            if not self._is_wake(sample):
-                return sample
+            if (data := sample.payload.to_bytes()) != self._wake_payload:
+                return sample, data
         while timeout_s > 0.0 and not self._interrupted:
             deadline_s = deadline_s or time.monotonic() + timeout_s
             self._waker.arm(deadline_s)
             sample = self._subscriber.recv()
-            if not self._is_wake(sample):
-                return sample
+            if (data := sample.payload.to_bytes()) != self._wake_payload:
+                return sample, data
             if time.monotonic() >= deadline_s:
                 break
         self._interrupted = self._interrupted and timeout_s <= 0.0
@@ -186,10 +186,6 @@ class ChannelInbox:
         # First, for a full channel also holds up the thread that wakes, which is then waited for.
         self._subscriber.undeclare()
         self._waker.close()
-
-    def _is_wake(self, sample: zenoh.Sample) -> bool:
-        payload = sample.payload
-        return len(payload) == len(self._wake_payload) and payload.to_bytes() == self._wake_payload
 
 
 class _Waker:

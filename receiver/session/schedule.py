@@ -164,7 +164,7 @@ class SlotClock:
         """Settle the slot of a symbol, and those before it, which are returned."""
         missed = range(self.slot, slot)
         self.silent_slots = 0
-        self.slot = slot + 1
+        self.slot = max(self.slot, slot) + 1
         return missed
 
     def expired(self, now_ns: int) -> Iterator[int]:

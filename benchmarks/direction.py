@@ -76,7 +76,7 @@ def closed_loop(
     """Fly with `u = -law x_hat`; return the mean of e' M e just after the bits, infinite if lost."""
     np.random.seed(seed)
     n = len(F)
-    state, believed, seen = np.zeros(n), np.zeros(n), np.zeros(n)
+    state, estimate, seen = np.zeros(n), np.zeros(n), np.zeros(n)
     correction = np.zeros(n)
     command = np.zeros(E.shape[1])
     coder, after = start.copy(), start.copy()
@@ -88,15 +88,15 @@ def closed_loop(
             measured = np.floor((C @ state) / step + 0.5) * step
             seen += gains @ (measured - C @ seen)
             if tick == 0:
-                encode(constants, coder, believed, seen, word)
-                decode(constants, coder, believed, word, False, correction, after)
+                encode(constants, coder, estimate, seen, word)
+                decode(constants, coder, estimate, word, False, correction, after)
                 coder[:] = after
-                believed += correction
+                estimate += correction
                 if sample >= settling:
-                    error = state - believed
+                    error = state - estimate
                     total += error @ (M @ error)
-            command = -(law @ believed)
-            believed = F @ believed + E @ command
+            command = -(law @ estimate)
+            estimate = F @ estimate + E @ command
             state = F @ state + E @ command + root @ np.random.standard_normal(n)
         for output in C @ state:
             if not abs(output) < lost:

@@ -74,7 +74,7 @@ class TransmitterNode:
         if not rig.is_recorded:
             self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
         self._applied = guard.command
-        self._guard_told = guard.state
+        self._guard_reported = guard.state
 
     def before_every_tick(self, act: Callable[[int], None]) -> None:
         """Have this called before every tick: where a person's commands take hold."""
@@ -168,7 +168,7 @@ class TransmitterNode:
                 self.guard.state.value,
             ),
         )
-        if self.guard.state is not self._guard_told:
+        if self.guard.state is not self._guard_reported:
             self._tell_guard()
         return volts
 
@@ -220,7 +220,7 @@ class TransmitterNode:
         self.guard.check_outputs(tick, reading.measured)
 
     def _tell_guard(self) -> None:
-        self._guard_told = self.guard.state
+        self._guard_reported = self.guard.state
         if self.guard.state is not GuardState.RUNNING:
             reason = self.guard.reason
             event = Event(EventKind.GUARD, state=self.guard.state)

@@ -32,7 +32,7 @@ FRAME_S = 0.2
 """flight time from one picture to the next"""
 FRAME_MS = 100
 """how long a picture stands: twice real time"""
-TOLD_S = 1.6
+CAPTION_S = 1.6
 """flight time for which an event stays on the screen"""
 READ_S = 1.0
 """what it takes to read one"""
@@ -89,10 +89,10 @@ def fly_story() -> Story:
         run = RunFolder(Path(folder))
         run_in_memory(agreement, run, "none")
         curves = read_curves(run.transmitter, run.receiver)
-        return _told(curves, Recording(run.transmitter))
+        return _story(curves, Recording(run.transmitter))
 
 
-def _told(curves: Curves, recording: Recording) -> Story:
+def _story(curves: Curves, recording: Recording) -> Story:
     count = round(DURATION_S * 10.0)
     words: list[float | None] = [None] * count
     digests = [True] * count
@@ -124,7 +124,7 @@ def frame_at(story: Story, now_s: float) -> Image:
     body = figure.add_axes((0.0, 0.30, 0.34, 0.62))
     past = figure.add_axes((0.40, 0.36, 0.585, 0.50))
     tape = figure.add_axes((0.40, 0.10, 0.585, 0.15))
-    said = [event for event in story.events if event[0] <= now_s < event[0] + TOLD_S]
+    said = [event for event in story.events if event[0] <= now_s < event[0] + CAPTION_S]
     _draw_body(body, story.curves, now_s)
     _draw_past(past, story.curves, now_s)
     _draw_tape(tape, story, now_s)

@@ -96,7 +96,7 @@ def check_guard(evidence: Evidence) -> None:
     """
     config = evidence.agreement.config
     by_guard = config.transmitter.rig != "replay" and not config.transmitter.dry_run
-    told = {round(row.time_s * 1e9) for row in evidence.topic("transmitter", "event")}
+    reported = {round(row.time_s * 1e9) for row in evidence.topic("transmitter", "event")}
     tick_ns = evidence.terms.tick_ns
     passed = _Passed(evidence.agreement)
     changes: list[int] = []
@@ -111,24 +111,24 @@ def check_guard(evidence: Evidence) -> None:
             place.leak("applied", "it is not the guard's output", detail)
         if passed.changed and row.guard != "running":
             changes.append(now_ns)
-        if passed.armed_again and not {now_ns, now_ns - tick_ns} & told:
+        if passed.armed_again and not {now_ns, now_ns - tick_ns} & reported:
             place.gap("guard", "no event tells that it was armed again", row.guard)
         if row.late and (row.commanded is not None or passed.stays_stopped):
             place.leak("late", "no command was owed, or it had come")
-    _check_told(evidence, changes)
+    _check_reported(evidence, changes)
 
 
-def _check_told(evidence: Evidence, changes: list[int]) -> None:
+def _check_reported(evidence: Evidence, changes: list[int]) -> None:
     """Each change of the guard, but that to passing commands, is one event, and no other is."""
     guards = [row for row in evidence.topic("transmitter", "event") if row.kind == "guard"]
-    told = Counter(round(row.time_s * 1e9) for row in guards)
+    reported = Counter(round(row.time_s * 1e9) for row in guards)
     changed = Counter(changes)
     complete = evidence.is_whole("transmitter")
-    for now_ns in sorted(told.keys() | changed.keys()):
-        if told[now_ns] != changed[now_ns] and (complete or now_ns < max(changes, default=0)):
+    for now_ns in sorted(reported.keys() | changed.keys()):
+        if reported[now_ns] != changed[now_ns] and (complete or now_ns < max(changes, default=0)):
             what = "the guard's state in the ticks tells of another number of changes"
             place = evidence.at("transmitter", "event", f"time {now_ns / 1e9:.3f} s")
-            place.gap("kind", what, f"{told[now_ns]} events, {changed[now_ns]} changes")
+            place.gap("kind", what, f"{reported[now_ns]} events, {changed[now_ns]} changes")
 
 
 class _Passed:

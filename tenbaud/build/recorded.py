@@ -294,13 +294,13 @@ def _notes(config: FlightConfig) -> Iterator[str]:
     yield from log.notes
     if log.commands.size:
         limits = build_limits(config, signals).command_max
-        told = [
+        described = [
             f"{one.name} up to {largest:g} {one.unit}".rstrip() + f" (limit {limit:g})"
             for one, largest, limit in zip(
                 signals.inputs, largest_commands(log, signals), limits, strict=True
             )
         ]
-        yield f"commands as recorded: {', '.join(told)}"
+        yield f"commands as recorded: {', '.join(described)}"
     else:
         yield "the file has no commands: zero is commanded"
     begin = model.measured(model.initial())

@@ -96,19 +96,19 @@ def _route(
         typer.echo(f"tenbaud router at {', '.join(addresses)}", err=True)
         _tell_until(stop, running)
         refused = running.refused + log.refused
-    told = ", ".join(f"{count} {reason}" for reason, count in refused.items())
-    typer.echo(f"tenbaud router: stopped; connections refused: {told or 'none'}", err=True)
+    counted = ", ".join(f"{count} {reason}" for reason, count in refused.items())
+    typer.echo(f"tenbaud router: stopped; connections refused: {counted or 'none'}", err=True)
 
 
 def _tell_until(stop: Callable[[], bool], running: ZenohRouter) -> None:
-    told, next_s = -1, 0.0
+    shown, next_s = -1, 0.0
     while not stop():
         time.sleep(POLL_S)
         if time.monotonic() >= next_s:
             next_s = time.monotonic() + TELL_S
             count = running.connected
-            if count != told:
-                told = count
+            if count != shown:
+                shown = count
                 typer.echo(f"tenbaud router: {count} connected", err=True)
 
 

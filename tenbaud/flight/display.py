@@ -36,7 +36,7 @@ class StatusDisplay:
 
         console = Console(stderr=True)
         self._live: Live | None = None
-        self._told_s = 0.0
+        self._shown_s = 0.0
         self._screen: Screen = Screen(unicode_fits(console))
         if console.is_terminal and not console.is_dumb_terminal:
             from rich.live import Live
@@ -46,7 +46,7 @@ class StatusDisplay:
     def __enter__(self) -> Self:
         if self._live is not None:
             self._live.start(refresh=True)
-        self._told_s = time.monotonic()
+        self._shown_s = time.monotonic()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -58,11 +58,11 @@ class StatusDisplay:
         now_s = time.monotonic()
         if self._live is not None:
             self._screen.update(status)
-            if now_s - self._told_s >= PERIOD_S / 2.0:
-                self._told_s = now_s
+            if now_s - self._shown_s >= PERIOD_S / 2.0:
+                self._shown_s = now_s
                 self._live.refresh()
-        elif now_s - self._told_s >= PLAIN_PERIOD_S:
-            self._told_s = now_s
+        elif now_s - self._shown_s >= PLAIN_PERIOD_S:
+            self._shown_s = now_s
             sys.stderr.write(f"{status_line(status)}\n")
             sys.stderr.flush()
 

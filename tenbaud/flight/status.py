@@ -21,11 +21,11 @@ def outputs_status(
 ) -> list[Status]:
     """Return the values of each output in a status; None if unknown."""
     names = ("value", "range", "error")
-    told = []
+    outputs = []
     for place, one in enumerate(plant.outputs):
         known = [each[place] if place < len(each) else None for each in (values, ranges, errors)]
-        told.append({"name": one.words, "unit": one.unit, **dict(zip(names, known, strict=True))})
-    return told
+        outputs.append({"name": one.words, "unit": one.unit, **dict(zip(names, known, strict=True))})
+    return outputs
 
 
 def status_line(status: Status) -> str:

@@ -252,8 +252,8 @@ def identify_sources(config: FlightConfig, sources: Sequence[Source], request: R
             each.append(_from_bits(source, source.bits, request))
             continue
         record, dropped = with_commands(source.record)
-        told = [f"{name}: a set-point, which moves no plant: left out" for name in dropped]
-        source = replace(source, record=record, dropped=dropped, notes=(*source.notes, *told))
+        notes = [f"{name}: a set-point, which moves no plant: left out" for name in dropped]
+        source = replace(source, record=record, dropped=dropped, notes=(*source.notes, *notes))
         one = run(source.name, record, _wanted(config, source, request))
         if isinstance(one.found.structure, PitchStructure):
             one = replace(one, record=_as_pitch(one.record, configured_signals(config)))

@@ -182,7 +182,7 @@ def _check_gaps(
     row = int(gaps[0])
     edges = [0, *(gaps + 1).tolist(), len(times)]
     stretches = sorted(pairwise(edges), key=lambda one: one[0] - one[1])
-    told = ", ".join(
+    options = ", ".join(
         f"--from {shown(times[first], usual)} --to {shown(times[last - 1] + usual / 2, usual)}"
         for first, last in sorted(stretches[:STRETCHES_MAX])
         if last - first > 1
@@ -191,7 +191,7 @@ def _check_gaps(
         rows.start + row + 1,
         column,
         f"{shown(times[row + 1], usual)} s after {shown(times[row], usual)} s, where the usual step is "
-        f"{usual:g} s; choose one of the {len(edges) - 1} stretches between the gaps: {told}",
+        f"{usual:g} s; choose one of the {len(edges) - 1} stretches between the gaps: {options}",
     )
 
 

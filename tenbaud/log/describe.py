@@ -48,8 +48,8 @@ class Sampling:
             f"from {shown(self.first_s, self.step_s)} to {shown(self.last_s, self.step_s)} s"
         )
         faults = [("gaps", self.gaps), ("times that do not rise", self.repeats)]
-        told = [f"{what}: {count}" for what, count in faults if count]
-        return "; ".join([text, *told]) + (f" ({', '.join(self.places)})" if told else "")
+        counted = [f"{what}: {count}" for what, count in faults if count]
+        return "; ".join([text, *counted]) + (f" ({', '.join(self.places)})" if counted else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,9 +107,9 @@ class Description:
         if self.sampling is not None:
             lines.append(f"Sampling: {self.sampling.words}.")
         if self.log is not None:
-            told = [note for note in self.log.notes if note != self.source]
+            notes = [note for note in self.log.notes if note != self.source]
             lines += [f"Read as: {len(self.log)} rows {self.log.tick_s:g} s apart."]
-            lines += [f"  {note}" for note in told]
+            lines += [f"  {note}" for note in notes]
         if self.suggestion.others:
             others = ", ".join(self.suggestion.others)
             lines.append(f"Other outputs: {others}; --columns angle=NAME takes one.")

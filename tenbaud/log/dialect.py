@@ -54,7 +54,7 @@ class Dialect:
         return self.comment if len(self.comment) == 1 else ""
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         decimals = ", decimal commas" if self.decimal == "," else ""
         return f"text, {_SEPARATORS[self.separator]}{decimals}, {self.encoding}{self.note}"
 

@@ -56,12 +56,12 @@ def table_of(
             if left := len(kept) - int(kept.sum()):
                 notes.append(f"{left} row(s) left out: files before, or {name}, have none there")
     if kept.sum() < 2:
-        told = [
+        spans = [
             f"{Path(table.path).name} from {shown(own[0], _step(own))} to "
             f"{shown(own[-1], _step(own))} s"
             for table, (_, own) in zip(tables, clocks, strict=True)
         ]
-        raise LogError(f"{first.path}: joined files do not overlap in time: {'; '.join(told)}")
+        raise LogError(f"{first.path}: joined files do not overlap in time: {'; '.join(spans)}")
     rows = np.flatnonzero(kept)
     holds = set(held())
     columns = []

@@ -68,10 +68,10 @@ def _look(table: Table, place: int) -> Look:
     if not len(there):
         text = next((text for _, text in table.faults.get(name, ())), "")
         return Look(name, "empty", f"text, such as {text!r}" if text else "no numbers", unit)
-    kind, words, told = _kind(there, unit)
+    kind, words, supposed = _kind(there, unit)
     guess = ""
-    if not unit and told:
-        unit, _, guess = told.partition(": ")
+    if not unit and supposed:
+        unit, _, guess = supposed.partition(": ")
         if unit == COUNTS and is_speed(name):
             unit = guess = ""
     return Look(name, kind, words, unit, guess, float(there.min()), float(there.max()), missing)

@@ -31,7 +31,7 @@ from tenbaud.log.units import (
 
 ROWS_MIN = 2
 COUNTS_MAX = 2.0**53
-ROWS_TOLD = 3
+ROWS_NAMED = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -261,11 +261,11 @@ class _Reading:
     ) -> Array:
         cleaned, name = without_spikes(values, turn), signal.name
         if cleaned.rows:
-            told = f"{name}: {len(cleaned.rows)} spike(s), {self._lines(cleaned.rows, clock)}"
+            found = f"{name}: {len(cleaned.rows)} spike(s), {self._lines(cleaned.rows, clock)}"
             if self.section.remove_spikes:
                 values = cleaned.values
             done = ": removed" if self.section.remove_spikes else "; --remove-spikes removes them"
-            self.notes.append(told + done)
+            self.notes.append(found + done)
         if np.ptp(values) == 0.0:
             self.notes.append(f"{name}: constant")
         if turn is None:
@@ -279,8 +279,8 @@ class _Reading:
         return whole.values
 
     def _lines(self, rows: tuple[int, ...], clock: Clock) -> str:
-        told = [self.table.place(row + clock.rows.start) for row in rows[:ROWS_TOLD]]
-        return ", ".join(told) + (" ..." if len(rows) > ROWS_TOLD else "")
+        places = [self.table.place(row + clock.rows.start) for row in rows[:ROWS_NAMED]]
+        return ", ".join(places) + (" ..." if len(rows) > ROWS_NAMED else "")
 
     def _check_whole(self, values: Array, column: int, clock: Clock) -> None:
         wrong = np.flatnonzero((values != np.floor(values)) | (np.abs(values) > COUNTS_MAX))

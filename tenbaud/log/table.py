@@ -91,10 +91,10 @@ class Table:
         found = self.columns[column][row]
         if np.isinf(found):
             text = text or str(found)
-        told = f"'{text}' is not a finite number" if text else "empty cell"
+        problem = f"'{text}' is not a finite number" if text else "empty cell"
         if not np.isinf(found) and text:
-            told = f"'{text}' is not a number"
-        raise self.fault(row, column, f"{told}; correct it, or leave it out with --from and --to")
+            problem = f"'{text}' is not a number"
+        raise self.fault(row, column, f"{problem}; correct it, or leave it out with --from and --to")
 
 
 def find_column(path: str, names: Sequence[str], wanted: str) -> int:

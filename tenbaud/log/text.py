@@ -40,7 +40,7 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
     rows = max([column.used for column in columns], default=0)
     return Table(
         str(path),
-        dialect.told,
+        dialect.description,
         tuple([names[place] for place in places]),
         tuple([units[place] for place in places]),
         tuple([column.values()[:rows] for column in columns]),
@@ -134,7 +134,7 @@ def _chunks(path: Path, dialect: Dialect) -> Any:
             keep_default_na=False,
             na_values=[""],
             chunksize=CHUNK_ROWS,
-            low_memory=False,  # numbers and texts in one column would be told apart piece by piece
+            low_memory=False,  # numbers and texts in one column would be found out piece by piece
         ) as chunks:
             yield from chunks
     except pd.errors.EmptyDataError:
@@ -142,8 +142,8 @@ def _chunks(path: Path, dialect: Dialect) -> Any:
     except (pd.errors.ParserError, UnicodeError) as error:
         text = str(error).removeprefix("Error tokenizing data. C error: ").strip()
         if found := re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", text):
-            told = f"{found[3]} cells found, {found[1]} expected; {MIXED}"
-            raise LogError(f"{path}, line {found[2]}: {told}") from error
+            problem = f"{found[3]} cells found, {found[1]} expected; {MIXED}"
+            raise LogError(f"{path}, line {found[2]}: {problem}") from error
         raise LogError(f"{path}: no table: {text[:1].lower()}{text[1:]}") from error
 
 

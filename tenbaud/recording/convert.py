@@ -167,9 +167,9 @@ def _write_json(run: Run, path: Path) -> None:
         stream.write(b'{"run":' + orjson.dumps(about) + b',"time_s":' + _json_values(run.time_s))
         stream.write(b',"signals":{')
         for number, signal in enumerate(run.signals.values()):
-            told = {"unit": signal.unit, "description": signal.description}
+            facts = {"unit": signal.unit, "description": signal.description}
             stream.write(b"," if number else b"")
-            stream.write(orjson.dumps(signal.name) + b":" + orjson.dumps(told)[:-1] + b',"values":')
+            stream.write(orjson.dumps(signal.name) + b":" + orjson.dumps(facts)[:-1] + b',"values":')
             stream.write(_json_values(signal.values) + b"}")
         stream.write(b'},"samples":{')
         for number, (name, column) in enumerate(samples.items()):

@@ -71,13 +71,13 @@ def unpacked_holes(metadata: dict[str, str]) -> list[Hole]:
     return holes
 
 
-def _unpacked(told: dict[str, Any]) -> Hole:
+def _unpacked(fields: dict[str, Any]) -> Hole:
     missing: Missing = {}
-    for topic, (first, last) in told["missing"].items():
+    for topic, (first, last) in fields["missing"].items():
         missing[topic] = (None if first is None else _key(first), _key(last))
-    keys = {topic: key for topic, key in told["keys"].items() if key in KEYS}
-    to_s = None if told["to_s"] is None else float(told["to_s"])
-    return Hole(float(told["from_s"]), to_s, str(told["reason"]), missing, keys)
+    keys = {topic: key for topic, key in fields["keys"].items() if key in KEYS}
+    to_s = None if fields["to_s"] is None else float(fields["to_s"])
+    return Hole(float(fields["from_s"]), to_s, str(fields["reason"]), missing, keys)
 
 
 def _key(value: Any) -> int:

@@ -141,8 +141,8 @@ def _metadata_lines(name: str, value: str) -> list[str]:
         if not isinstance(fields, dict):
             lines.append(f"    {section}: {json.dumps(fields)}")
             continue
-        told = ", ".join(f"{field} {json.dumps(one)}" for field, one in fields.items())
-        lines.append(f"    {section}: {told}")
+        values = ", ".join(f"{field} {json.dumps(one)}" for field, one in fields.items())
+        lines.append(f"    {section}: {values}")
     return lines
 
 

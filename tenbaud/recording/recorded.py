@@ -160,12 +160,12 @@ class RecordedRun:
 
         The text is a sentence made from the fields, for people.
         """
-        told = [
+        found = [
             {"end": end, **row, "text": events.event_text(row)}
             for end in self.ends
             for row in (self.table(end, "event").rows if "event" in self.topics(end) else [])
         ]
-        return sorted(told, key=lambda event: event.get("time_s") or 0.0)
+        return sorted(found, key=lambda event: event.get("time_s") or 0.0)
 
     @property
     def metadata(self) -> dict[str, str]:

@@ -121,15 +121,15 @@ class TelemetryEnd:
     def summary(self) -> dict[str, Any]:
         if self.publisher is None or self.tap is None:
             return {"telemetry": "off"}
-        told = {
+        counted = {
             "telemetry": self.publisher.error or "on",
             "telemetry_sent": self.publisher.sent,
             "telemetry_dropped": self.publisher.composer.skipped,
             "telemetry_rows_dropped": self.tap.dropped,
         }
         if self.queue is not None:
-            told["commands_refused"] = self.queue.refused
-        return told
+            counted["commands_refused"] = self.queue.refused
+        return counted
 
     def _port(self) -> Any:
         if self.endpoint is None:

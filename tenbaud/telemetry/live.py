@@ -125,12 +125,12 @@ class LiveTransmitter:
         return -(-tick // per_sample) * per_sample
 
     def _stand_still(self, tick: int) -> None:
-        told_at = time.monotonic()
+        sent_at = time.monotonic()
         while self._pause_tick is not None and tick >= self._pause_tick and not self._should_stop():
             self.paused = True
             time.sleep(PAUSE_POLL_S)
-            if time.monotonic() - told_at >= KEEP_ALIVE_S:
-                told_at = time.monotonic()
+            if time.monotonic() - sent_at >= KEEP_ALIVE_S:
+                sent_at = time.monotonic()
                 self.keep_alive()
             self._obey(tick)
         if self.paused:

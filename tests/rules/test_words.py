@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -25,11 +25,25 @@ PAGES = sorted(
     if path.name != "CHANGELOG.md"
 )
 """All but the changes, which name what there was."""
+Texts = Callable[[str], Iterator[tuple[int, str]]]
 CODE_FOLDERS = (*PACKAGES, *OUTSIDE, "tests", "benchmarks")
 
 
 def private_words(text: str) -> list[str]:
     return PRIVATE.findall(" ".join(text.split()))
+
+
+def names_of(source: str) -> Iterator[tuple[int, str]]:
+    """Yield (line, words) of each name of a value, argument, function or class."""
+    for node in ast.walk(ast.parse(source)):
+        name = ""
+        match node:
+            case ast.Name(id=name) | ast.Attribute(attr=name) | ast.arg(arg=name):
+                pass
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                pass
+        if name:
+            yield node.lineno, re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).replace("_", " ")
 
 
 def prose_of(source: str) -> Iterator[tuple[int, str]]:
@@ -42,10 +56,10 @@ def prose_of(source: str) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.name.replace("_", " ")
 
 
-def findings(source: str, name: str) -> list[str]:
+def findings(source: str, name: str, of: Texts = prose_of) -> list[str]:
     return [
         f"{name}:{line}: {', '.join(found)}"
-        for line, text in sorted(prose_of(source))
+        for line, text in sorted(of(source))
         if (found := private_words(text))
     ]
 
@@ -61,6 +75,12 @@ def test_when_the_help_is_printed_then_it_has_no_private_words() -> None:
 
 def test_when_docstrings_and_test_names_are_read_then_they_have_no_private_words() -> None:
     found = [line for name, source in files_below(*CODE_FOLDERS) for line in findings(source, name)]
+    assert not found, report(found)
+
+
+def test_when_names_of_the_product_are_read_then_they_have_no_private_words() -> None:
+    files = files_below(*PACKAGES, *OUTSIDE, "benchmarks")
+    found = [line for name, source in files for line in findings(source, name, names_of)]
     assert not found, report(found)
 
 
@@ -83,3 +103,8 @@ def test_when_code_has_private_words_then_they_are_found_in_its_prose_alone() ->
         "    told()\n"
     )
     assert [line.split(":")[1] for line in findings(source, "rig.py")] == ["1", "5", "6"]
+
+
+def test_when_a_name_has_a_private_word_then_it_is_found() -> None:
+    source = "told_s = 1\nclass Told: pass\ndef f(was_told): self.told = was_told\nuntold = 1\n"
+    assert [line.split(":")[1] for line in findings(source, "rig.py", names_of)] == list("12333")

@@ -86,7 +86,7 @@ class RealFlight(Flight):
         self._welcome = b""
         self._is_answered = self._has_begun = False
         self._old_answers = 0
-        self._peer_told = True
+        self._peer_reported = True
         """presence of the receiver as last reported"""
         terms = endpoint.node.session.terms
         self._tick_ns = terms.tick_ns
@@ -240,7 +240,7 @@ class RealFlight(Flight):
 
     def _watch_peer(self) -> None:
         present = self._link.peer_present()
-        if present is not self._peer_told:
-            self._peer_told = present
+        if present is not self._peer_reported:
+            self._peer_reported = present
             cause = Presence.BACK if present else Presence.GONE
             self.endpoint.node.tell(Event(EventKind.PEER, cause=cause))

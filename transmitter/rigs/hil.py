@@ -206,5 +206,5 @@ class HilRig(DeviceRig):
         try:
             yield
         except self._library.error as error:
-            told = getattr(error, "get_error_message", None)
-            raise RigError(f"{self.name} {what}: {told() if told else error}") from error
+            message_of = getattr(error, "get_error_message", None)
+            raise RigError(f"{self.name} {what}: {message_of() if message_of else error}") from error

@@ -192,12 +192,12 @@ def learn(
     agrees = sign * d / math.sqrt(d * d + constants.delta)
     run = coder[first + n] + constants.mu * (agrees - coder[first + n])
     size = strength * constants.kappa * (1.0 + constants.tau * agrees) * sign
-    swing = constants.kappa * sign - constants.a * d
+    shift = constants.kappa * sign - constants.a * d
     for i in range(n):
         correction[i] += size * v[i]
         for j in range(i + 1):
             coder[place(i, j)] -= constants.alpha * (v[i] * v[j])
-        coder[first + i] += swing * v[i]
+        coder[first + i] += shift * v[i]
     positive = run if run > 0.0 else 0.0
     change = constants.k * (agrees + constants.beta) + constants.eta * (positive * positive * positive)
     strength = strength * (1.0 + change)

@@ -135,8 +135,8 @@ def take(
         weight = weights[part]
         agreed += weight * agrees[part]
         for i in range(n):
-            swing = 2.0 * each[part * size + i] - weight * v[i]
-            coder[first + i] += constants.kappa * sign * swing - constants.a * d * v[i]
+            moved = 2.0 * each[part * size + i] - weight * v[i]
+            coder[first + i] += constants.kappa * sign * moved - constants.a * d * v[i]
         run = coder[first + n] + constants.mu * weight * (agrees[part] - coder[first + n])
         coder[first + n] = run
         cube = run * run * run if run > 0.0 else 0.0

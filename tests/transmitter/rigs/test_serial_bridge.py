@@ -241,7 +241,7 @@ def test_the_wrong_format_is_reported_with_what_came() -> None:
 
 
 def test_fewer_channels_than_axes_are_reported() -> None:
-    bridge = {"first_sample_timeout_s": 0.5, "elevation": {"channel": 3}}
+    bridge = {"first_sample_timeout_s": 2.0, "elevation": {"channel": 3}}
     with emulated("cobs") as emulator:
         with pytest.raises(RigError, match=r"bridge\.axes"):
             serial_rig(emulator.line.address, bridge=bridge).open()

@@ -149,8 +149,9 @@ def _rank(item: pytest.Item) -> int:
         return len(LONGEST_FIRST) + 1  # at the end, when no module-wide fixture is at work any more
     if item.nodeid.endswith(COMPILED_BEFORE):
         return len(LONGEST_FIRST)
-    ranks = [rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)]
-    return ranks[0] if ranks else len(LONGEST_FIRST)
+    if not item.nodeid.startswith(LONGEST_FIRST):
+        return len(LONGEST_FIRST)
+    return next(rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start))
 
 
 @pytest.fixture(scope="session")

@@ -28,7 +28,7 @@ from benchmarks.page import page_figures
 from benchmarks.recordings import recording_figures
 from benchmarks.studies import studies_figures
 
-BENCHMARKS: dict[str, Callable[[], Iterable[Figure]]] = {
+BENCHMARKS: dict[str, Callable[..., Iterable[Figure]]] = {
     "codec": codec_figures,
     "start": cold_start_figures,
     "virtual": virtual_figures,

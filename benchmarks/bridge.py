@@ -140,7 +140,7 @@ def _trip(
         if data is None:
             raise TimeoutError(f"no command for sample {tick}")
         session.on_frame(link.wire.decode(data))
-    volts = session.confirmed.pop().flown.commands[-1]
+    volts = session.following.take_confirmed()[-1].flown.commands[-1]
     rig.write(tick, volts)
     waiter.join()
     if not arrived or arrived[0] < 0.0:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import timeit
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.figures import Figure
-from tenbaud.build.flight import build_codec
+from tenbaud.build.codec import build_codec
 from tenbaud.config.load import load_config
+from tenbaud.config.models import PitchModelSection
 
 SAMPLES = 300
 ROUNDS = 15
@@ -30,17 +32,19 @@ def codec_figures() -> list[Figure]:
     plain_us = min(timeit.repeat(fly, number=1, repeat=ROUNDS)) / (SAMPLES * ticks) * 1e6
 
     p = config.model
+    assert isinstance(p, PitchModelSection), "the preset flies the pitch model"
     state = np.array([0.3, 0.1, 1.0, -1.0])
     held = np.array([0.02, 0.04, 0.0, 0.0])
     volts = np.array([1.25, -1.25])
     h = config.timing.tick_s
 
-    def derivative(x: np.ndarray) -> np.ndarray:
+    def derivative(x: NDArray[np.float64]) -> NDArray[np.float64]:
         torque = p.torque_gain_rad_per_v_s2 * (x[2] - x[3])
         stiffness = p.stiffness_per_s2 * np.sin(x[0] - p.equilibrium_rad)
         rate = -p.rate_damping_per_s * x[1] - stiffness + torque
         lag = (volts - x[2:]) / p.motor_lag_s
-        return np.concatenate(([x[1], rate], lag)) + held
+        slopes: NDArray[np.float64] = np.concatenate(([x[1], rate], lag)) + held
+        return slopes
 
     def numpy_tick() -> None:
         k1 = derivative(state)

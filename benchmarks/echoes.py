@@ -17,6 +17,10 @@ from typing import Any
 
 import zenoh
 
+from channel.line.clocks import SkewedClock
+from channel.line.impairments import LineFaults
+from channel.links.base import Link
+
 UP, DOWN = "ping/up", "ping/down"
 
 
@@ -56,7 +60,7 @@ def udp(address: str, reply: bytes, _: dict[str, Any]) -> None:
         line.bind(("127.0.0.1", int(address)))
         _ready()
         while True:
-            _, peer = line.recvfrom(2048)
+            peer = line.recvfrom(2048)[1]
             line.sendto(reply, peer)
 
 
@@ -102,12 +106,12 @@ def receiver(address: str, _: bytes, settings: dict[str, Any]) -> None:
         with ZenohLink("receiver", "ping", listen=(address,)) as link:
             built = build_receiver(agreement, recorder, link.wire)
             clock = SymbolClock(agreement.terms.sample_ns)
-            endpoint = ReceiverEndpoint(built.session, built.downlink, clock)  # type: ignore[arg-type]
+            endpoint = ReceiverEndpoint(built.session, built.downlink, clock)
             _ready()
-            serve(endpoint, CountedLink(link, clock), 3600.0)  # type: ignore[arg-type]
+            serve(endpoint, CountedLink(link, clock), 3600.0)
 
 
-class SymbolClock:
+class SymbolClock(SkewedClock):
     """A clock for a receiver that is asked faster than its slots are due: one sample for each message.
 
     The receiver drops symbols far ahead of its schedule, and these come as fast as they are answered.
@@ -115,31 +119,43 @@ class SymbolClock:
     """
 
     def __init__(self, sample_ns: int) -> None:
+        super().__init__(LineFaults())
         self.messages = 0
         self._sample_ns = sample_ns
 
-    def shown(self, now_ns: int) -> int:
+    def shown(self, true_ns: int) -> int:
         """Return the time that this clock shows."""
         return self.messages * self._sample_ns
 
-    def reached(self, shown_ns: int, now_ns: int) -> int:
+    def reached(self, shown_ns: int, not_before_ns: int = 0) -> int:
         """Return when it will show a time: with the messages, not by itself."""
-        return now_ns + 1_000_000_000
+        return not_before_ns + 1_000_000_000
 
 
-class CountedLink:
-    """The part of a link that a receiver's loop uses, with its messages counted."""
+class CountedLink(Link):
+    """A link whose messages set a clock."""
 
-    def __init__(self, link: Any, clock: SymbolClock) -> None:
-        self.send = link.send
-        self._receive = link.receive
+    def __init__(self, link: Link, clock: SymbolClock) -> None:
+        super().__init__()
+        self._link = link
         self._clock = clock
+
+    def send(self, data: bytes) -> None:
+        """Send one message."""
+        self._link.send(data)
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message, None when none comes in time."""
-        data: bytes | None = self._receive(timeout_s)
+        data = self._link.receive(timeout_s)
         self._clock.messages += data is not None
         return data
+
+    def peer_present(self) -> bool:
+        """Return whether the other end is there."""
+        return self._link.peer_present()
+
+    def close(self) -> None:
+        """Leave the link open: it belongs to the caller."""
 
 
 KINDS = {"udp": udp, "tcp": tcp, "zenoh": bare, "receiver": receiver}

@@ -148,7 +148,13 @@ def _zenoh(stack: ExitStack, protocol: str, settings: dict[str, Any]) -> Ping:
     session = stack.enter_context(open_zenoh(settings, connect=endpoint))
     inbox = session.declare_subscriber(DOWN, zenoh.handlers.FifoChannel(100))
     out = publisher(session, UP)
-    _until(lambda: out.matching_status.matching, "the far end's subscriber")
+
+    def has_subscriber() -> bool:
+        # Zenoh's annotation says bool; it is an object with this one field.
+        status: Any = out.matching_status
+        return bool(status.matching)
+
+    _until(has_subscriber, "the far end's subscriber")
 
     def ping() -> int:
         sent_ns = time.perf_counter_ns()

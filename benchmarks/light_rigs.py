@@ -43,7 +43,7 @@ class LightRig:
             frame = self.inlet.take(data)
             if frame is not None:
                 self.session.on_frame(frame)
-        self.session.confirmed.clear()
+        self.session.following.take_confirmed()
 
     def fly(self, sample: int) -> None:
         """Send one symbol."""

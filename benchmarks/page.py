@@ -101,7 +101,7 @@ PAINTED_AT = """
 REPLAY_SHOWN = """
 () => {
   const time = document.getElementById("f-time");
-  return time && time.textContent === "0.0 s" && document.getElementById("value-0") && Date.now();
+  return time && parseFloat(time.textContent) >= 0 && document.getElementById("value-0") && Date.now();
 }
 """
 """When figures and curves of a recording are there."""

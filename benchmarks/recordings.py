@@ -21,6 +21,7 @@ from tenbaud.recording.convert import FORMS
 
 MINUTES = 10
 KILLED_AFTER_S = 6.0
+STARTED_S = 60.0
 TOP = Path(__file__).parents[1]
 
 OPEN = """
@@ -79,11 +80,11 @@ print(time.perf_counter() - flown, peak_mib() - begin_mib)
 """
 
 
-def recording_figures() -> list[Figure]:
-    """Return sizes and times of a ten-minute run, and what a killed pair of processes lost."""
+def recording_figures(minutes: int = MINUTES, long_ticks: int = LONG_TICKS) -> list[Figure]:
+    """Return sizes and times of a run of some minutes, and what a killed pair of processes lost."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        seconds = str(60 * MINUTES)
+        seconds = str(60 * minutes)
         _tenbaud(
             folder,
             *("demo", "--json", "--duration", seconds, "--delivery", "end", "--out", "run"),
@@ -100,7 +101,7 @@ def recording_figures() -> list[Figure]:
         figures.append(Figure("run_all_signals_s", everything, "s", ""))
         figures.append(_timed(folder, "replay_s", "replay", "run"))
         figures.append(_timed(folder, "audit_s", "audit", "run"))
-        figures += long_flight_end(folder)
+        figures += long_flight_end(folder, long_ticks)
         return figures + _killed(folder)
 
 
@@ -173,6 +174,7 @@ def _killed(folder: Path) -> list[Figure]:
         )
         for role, arguments in commands.items()
     }
+    _until_recorded(folder / "upper" / "transmitter.mcap")
     time.sleep(KILLED_AFTER_S)
     killed_s = time.time()
     for process in ends.values():
@@ -186,6 +188,15 @@ def _killed(folder: Path) -> list[Figure]:
         assert len(run.time_s) > 100, f"the {role} had not flown yet"
         figures.append(Figure(f"killed_{role}_loses_s", killed_s - written_s, "s", "at most 1"))
     return figures
+
+
+def _until_recorded(path: Path) -> None:
+    """Wait until a flight that has just been started has written something."""
+    give_up_s = time.monotonic() + STARTED_S
+    while not path.is_file() or path.stat().st_size == 0:
+        if time.monotonic() > give_up_s:
+            raise RuntimeError(f"nothing was recorded in {path}")
+        time.sleep(0.05)
 
 
 def _tenbaud(folder: Path, *arguments: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from channel.line.impairments import Impairments, LineFaults
@@ -45,7 +45,7 @@ class _Stopwatch(World):
         inner = self.watch.on_delivered
         self.watch.on_delivered = lambda node: self._look(node, inner)  # type: ignore[method-assign]
 
-    def _look(self, node: TransmitterNode, inner) -> None:  # type: ignore[no-untyped-def]
+    def _look(self, node: TransmitterNode, inner: Callable[[TransmitterNode], None]) -> None:
         inner(node)
         if node.session.phase is Phase.REJOINING and self.asked_ns is None:
             self.asked_ns = self.now_ns

@@ -9,6 +9,7 @@ benchmark and no command of the tool, because it describes this software and not
 from __future__ import annotations
 
 import argparse
+import math
 import multiprocessing
 import re
 import statistics
@@ -124,7 +125,7 @@ class Results:
         """Return the root mean square over all seeds, rad."""
         flights = self.of(coder, impairments, trip)
         squares = [(one.live_rms if live else one.coded_rms) ** 2 for one in flights]
-        return statistics.fmean(squares) ** 0.5
+        return math.sqrt(statistics.fmean(squares))
 
     def fly_all(self) -> None:
         """Fly on every core."""

@@ -20,6 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from channel.links.endpoints import free_endpoint, with_protocol
+from channel.links.kind import NodePlace
 from channel.links.security import Invited, Part, Security
 from channel.links.zenoh.link import ZenohLink
 from channel.links.zenoh.router import ZenohRouter
@@ -77,7 +78,7 @@ def _pair(keys: Path | None, routed: bool = False) -> Iterator[ZenohLink]:
         stack.callback(answering.terminate)
         place, peer = ("router", "hub") if routed else ("connect", "desk")
         security = None if keys is None else _security(keys, "rig", (peer, "receiver"))
-        rig = ZenohLink("transmitter", SESSION, security=security, **{place: (endpoint,)})
+        rig = ZenohLink("transmitter", SESSION, **_node(place, endpoint, security))
         stack.enter_context(rig)
         until = time.monotonic() + PATIENCE_S
         while not rig.peer_present():
@@ -90,10 +91,18 @@ def _pair(keys: Path | None, routed: bool = False) -> Iterator[ZenohLink]:
 def _answer(place: str, endpoint: str, keys: str, peer: str) -> None:
     security = _security(Path(keys), "desk", (peer, "transmitter")) if keys else None
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    with ZenohLink("receiver", SESSION, security=security, **{place: (endpoint,)}) as desk:
+    with ZenohLink("receiver", SESSION, **_node(place, endpoint, security)) as desk:
         while True:
             if desk.receive(PATIENCE_S) is not None:
                 desk.send(COMMAND)
+
+
+def _node(place: str, endpoint: str, security: Security | None) -> NodePlace:
+    if place == "router":
+        return {"router": (endpoint,), "security": security}
+    if place == "connect":
+        return {"connect": (endpoint,), "security": security}
+    return {"listen": (endpoint,), "security": security}
 
 
 def _security(keys: Path, name: str, *peers: tuple[str, Part]) -> Security:

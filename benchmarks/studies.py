@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import Figure
+from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.laws import clamped, is_stuck, pid_integral, pid_sum
 from channel.codec.numerics import sin
 from channel.protocol.limits import from_steps, to_steps
@@ -109,8 +110,9 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
         integral = pid_integral(pid_c, integral, error, stuck)
         limited = [clamped(value, most) for value, _, most in inputs]
         command = from_steps(to_steps(limited, signals), signals)
+        front, rear = command
         state = codec.model.tick(state, command, (e1, e2))
-        body = pitch_step(body, command, (0.0,), plant_c, sine)
+        body = pitch_step(body, (front, rear), (0.0,), plant_c, sine)
         return [*body, *state, m, last, e1, e2, integral, tick + 1.0]
 
     def output(t: float, x: Any, u: Any, params: object) -> list[float]:
@@ -167,10 +169,13 @@ def _shortest_once(fly: Callable[[], object]) -> float:
 def _c_call(loop: Any, point: CompiledPoint) -> tuple[Callable[[], object], Any]:
     """Return what flies the C loop once, and the array that it writes."""
     numbers = point.numbers
-    model_c, coder_c, plant_c, law = point.constants
+    model_c, _, plant_c, law = point.constants
     (pid_c,) = law.loops
-    zoom = [coder_c.decay, coder_c.floor, coder_c.gains[0][0], coder_c.gains[1][0]]
-    zoom.append(point.agreement.codec.coder.initial()[0])
+    coder = point.agreement.codec.coder
+    assert isinstance(coder, ZoomCoder), "the C loop has this coder alone"
+    zoom_c = coder.parameters
+    zoom = [zoom_c.decay, (1.0 - zoom_c.decay) * zoom_c.minimum_range]
+    zoom += [zoom_c.gains[0][0], zoom_c.gains[1][0], coder.initial()[0]]
     pid = [pid_c.proportional, pid_c.integral_per_tick, pid_c.derivative]
     pid += [point.steady["command_max"][0], 2.0 * law.bias[0]]
     out = np.zeros(3)

@@ -38,8 +38,17 @@ COMPILED_ONCE = (
 )
 """Their tests stay together: the first compiles a flight, the others read its machine code."""
 
-DESIGNED_ONCE = ("tests/tenbaud/flight/test_systems.py", "tests/tenbaud/flight/test_refused_systems.py")
-"""Each stays on one worker: the coder of a plant is designed once in a process."""
+WITH_CONTROL = (
+    "tests/tenbaud/flight/test_systems.py",
+    "tests/tenbaud/flight/test_refused_systems.py",
+    "tests/tenbaud/recording/test_steps.py",
+    "tests/channel/codec/models/test_linear.py",
+    "tests/plant_sim/test_linear.py",
+)
+"""Their tests stay together: one worker imports python-control, and designs each coder once."""
+
+WITH_TABLES = ("tests/tenbaud/log/",)
+"""They stay together: one worker imports pandas and what reads the files of other programs."""
 
 LONGEST_FIRST = (
     *COMPILED_ONCE,
@@ -88,6 +97,22 @@ def pytest_configure() -> None:
     gc.disable()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Let as many workers collect at a time as there are cores.
+
+    In a fresh checkout the first ones write the bytecode of the tests and the libraries, and the others
+    read it. All at once, each would compile all of it.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    if not worker:
+        return (yield)
+    place = int(worker.removeprefix("gw")) % (os.cpu_count() or 1)
+    with _MACHINE.with_suffix(f".{place}").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return (yield)
+
+
 def pytest_collection_finish() -> None:
     """Let the garbage collector pass over what all tests together have imported."""
     gc.freeze()
@@ -104,12 +129,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFixture(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
-            if file in COMPILED_ONCE:
-                return COMPILED_ONCE[0]
+            for group in (COMPILED_ONCE, WITH_CONTROL, WITH_TABLES):
+                if file.startswith(group):
+                    return group[0]
             if nodeid.startswith(PAGES) and not nodeid.endswith(COMPILED_BEFORE):
                 return f"{PAGES}{nodeid.count('/') % 2}"
-            together = file in DESIGNED_ONCE or _has_shared_fixture(config.rootpath / file)
-            return file if together else nodeid
+            return file if _has_shared_fixture(config.rootpath / file) else nodeid
 
     return ByFixture(config, log)
 
@@ -124,8 +149,9 @@ def _rank(item: pytest.Item) -> int:
         return len(LONGEST_FIRST) + 1  # at the end, when no module-wide fixture is at work any more
     if item.nodeid.endswith(COMPILED_BEFORE):
         return len(LONGEST_FIRST)
-    ranks = [rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)]
-    return ranks[0] if ranks else len(LONGEST_FIRST)
+    if not item.nodeid.startswith(LONGEST_FIRST):
+        return len(LONGEST_FIRST)
+    return next(rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start))
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import control
 import numpy as np
 import pytest
 
@@ -31,6 +30,8 @@ def plant(
 
 @pytest.mark.parametrize("name", plant_names())
 def test_when_a_plant_is_driven_then_its_outputs_are_those_of_control(name: str) -> None:
+    import control
+
     model = plant_section(name).model_dump()
     a, b, c = (np.array(model[one]) for one in "ABC")
     times = np.arange(100) * STEP_S

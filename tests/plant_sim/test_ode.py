@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from plant_sim.furuta import FurutaPlant
 from plant_sim.helicopter import PITCH_STOP_RAD, HelicopterPlant, force_of, volts_of
@@ -41,6 +40,8 @@ def test_when_a_plant_is_driven_then_it_follows_its_equations(
     lag_s: float,
     steps: int,
 ) -> None:
+    from scipy.integrate import solve_ivp
+
     plant = built(kind, len(command), initial=initial)
     begun, motors, places = plant.state, np.array(plant.motors), len(plant._still)
 

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from plant_sim.disturbance import StepTorque
 from plant_sim.pitch import PitchParameters, PitchPlant, pitch_constants, pitch_step
@@ -37,6 +36,8 @@ def slope(
 
 
 def reference_manoeuvre() -> np.ndarray:
+    from scipy.integrate import solve_ivp
+
     state = np.array([0.3, -0.2, 0.0, 0.0])
     for volts in MANOEUVRE:
         clamped = (min(max(volts[0], -5.0), 5.0), min(max(volts[1], -5.0), 5.0))

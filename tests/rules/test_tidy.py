@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 
 import pytest
 
@@ -69,6 +70,11 @@ def test_parts_of_parts_are_given_at_construction_or_through_a_method() -> None:
                     if not text.startswith(MAY_BE_ASSIGNED):
                         found.append(f"{name}:{node.lineno}: {text} is assigned from outside")
     assert not found, report(found)
+
+
+def test_every_folder_of_code_but_the_tests_is_type_checked() -> None:
+    checked = tomllib.loads((TOP / "pyproject.toml").read_text())["tool"]["mypy"]["packages"]
+    assert set(CODE_FOLDERS) - {"tests"} <= set(checked)
 
 
 def test_files_and_functions_are_short() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -40,10 +40,11 @@ def flight() -> tuple[Array, Array, Array, Array]:
 
 
 def lines(
-    rows: Iterable[Iterable[float]], separator: str = ",", decimal: str = ".", form: str = ".5f"
+    rows: Array | Sequence[Sequence[float]], separator: str = ",", decimal: str = ".", form: str = ".5f"
 ) -> list[str]:
     """Return rows of numbers as lines."""
-    return [separator.join(f"{value:{form}}".replace(".", decimal) for value in row) for row in rows]
+    line = separator.join([f"%{form}"] * len(rows[0]))
+    return [(line % tuple(row)).replace(".", decimal) for row in np.asarray(rows).tolist()]
 
 
 def table(change: Callable[[Array], Array] = lambda angle: angle) -> Array:
@@ -64,6 +65,7 @@ def write(path: Path, text: str | list[str], encoding: str = "utf-8", end: str =
     return path
 
 
+@cache
 def dialects() -> dict[str, Dialect]:
     """Return each way to write the flight."""
     rows = table()

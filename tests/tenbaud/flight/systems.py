@@ -1,12 +1,10 @@
-"""Systems of python-control, and flights of them."""
+"""Systems of python-control, and flights of them. It is imported where a test is run, not collected."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
 from typing import Any
-
-import control
 
 from tenbaud import Run, fly
 
@@ -18,13 +16,6 @@ NAMED = {
     "outputs": ["angle [rad]"],
 }
 UNDISTURBED = {"transmitter.plant.disturbance": ""}
-MASSES = control.ss(
-    [[0, 1, 0, 0], [-3, -1, 1, 0], [0, 0, 0, 1], [1, 0, -3, -1]],
-    [[0, 0], [1, 0], [0, 0], [0, 1]],
-    [[1, 0, 0, 0], [0, 0, 1, 0]],
-    0,
-    states=["left", "left_rate", "right", "right_rate"],
-)
 
 
 def flown(system: Any, folder: Path, **given: Any) -> Run:
@@ -32,8 +23,22 @@ def flown(system: Any, folder: Path, **given: Any) -> Run:
     return fly(system, settings=settings, out=folder / "run", **given)
 
 
+def masses() -> Any:
+    """Two masses, each on a spring, with a spring between them."""
+    import control
+
+    return control.ss(
+        [[0, 1, 0, 0], [-3, -1, 1, 0], [0, 0, 0, 1], [1, 0, -3, -1]],
+        [[0, 0], [1, 0], [0, 0], [0, 1]],
+        [[1, 0, 0, 0], [0, 0, 1, 0]],
+        0,
+        states=["left", "left_rate", "right", "right_rate"],
+    )
+
+
 def pendulum(gravity: float = 9.81, drift: float = 0.0) -> Any:
     """A pendulum that hangs, with friction; `drift` turns its gravity with time."""
+    import control
 
     def dynamics(t: float, x: Any, u: Any, params: Any) -> list[float]:
         return [x[1], -gravity * math.sin(x[0] + drift * t) - 0.2 * x[1] + u[0]]

@@ -6,17 +6,20 @@ import math
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 import pytest
 
 from tenbaud.errors import ConfigError
 from tests.tenbaud.flight.systems import NAMED, A, B, C, flown, pendulum
 
+CASES = 37
 
-@pytest.mark.parametrize(
-    ("system", "given", "text"),
-    [
+
+def refused() -> list[tuple[Any, dict[str, Any], str]]:
+    """Return plants, what is given beside them, and the words of the error."""
+    import control
+
+    return [
         (
             control.ss(A, B, C, [[0.5]], **NAMED),
             {},
@@ -125,11 +128,16 @@ from tests.tenbaud.flight.systems import NAMED, A, B, C, flown, pendulum
         ],
         ("tuned-10baud", {"rate_baud": 20.0}, "a preset says them itself"),
         (3.0, {}, "a float is neither the name of a preset nor a plant"),
-    ],
-)
+    ]
+
+
+@pytest.mark.parametrize("number", range(CASES))
 def test_when_a_plant_cannot_be_flown_then_the_error_names_signal_and_number(
-    system: Any, given: dict[str, Any], text: str, tmp_path: Path
+    number: int, tmp_path: Path
 ) -> None:
+    cases = refused()
+    assert len(cases) == CASES
+    system, given, text = cases[number]
     with pytest.raises(ConfigError, match=text):
         flown(system, tmp_path, **given)
     assert not (tmp_path / "run").exists()

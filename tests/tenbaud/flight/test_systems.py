@@ -6,11 +6,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 import pytest
-import scipy.integrate
-import scipy.signal
 
 from channel.codec.signals import InputSignal, Signal, Signals
 from receiver.controllers.base import ControllerContext
@@ -23,22 +20,28 @@ from tenbaud.design.systems import matrices
 from tenbaud.errors import PartError
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
-from tests.tenbaud.flight.systems import MASSES, NAMED, UNDISTURBED, A, B, C, flown, pendulum
+from tests.tenbaud.flight.systems import NAMED, UNDISTURBED, A, B, C, flown, masses, pendulum
 
 
-@pytest.mark.parametrize(
-    "system",
-    [
-        control.ss(A, B, C, 0),
-        scipy.signal.TransferFunction([1.0], [1.0, 0.5, 2.0]),
-        scipy.signal.StateSpace(A, B, C, [[0.0]]).to_discrete(0.01),
-    ],
-    ids=["control", "transfer function", "discrete"],
-)
+def system_of(kind: str) -> Any:
+    import control
+    import scipy.signal
+
+    systems = {
+        "control": control.ss(A, B, C, 0),
+        "transfer function": scipy.signal.TransferFunction([1.0], [1.0, 0.5, 2.0]),
+        "discrete": scipy.signal.StateSpace(A, B, C, [[0.0]]).to_discrete(0.01),
+    }
+    return systems[kind]
+
+
+@pytest.mark.parametrize("system", ["control", "transfer function", "discrete"])
 def test_when_a_system_is_flown_then_its_output_is_that_of_the_library(
-    system: Any, tmp_path: Path
+    system: str, tmp_path: Path
 ) -> None:
-    run = flown(system, tmp_path, reference=0.5, settings=UNDISTURBED)
+    import control
+
+    run = flown(system_of(system), tmp_path, reference=0.5, settings=UNDISTURBED)
     held = np.concatenate([run.values_of("input_1")[:-1], [0.0]])
     times = np.arange(len(held)) * 0.01
     expected = control.forced_response(control.c2d(control.ss(A, B, C, 0), 0.01), times, held)
@@ -48,6 +51,8 @@ def test_when_a_system_is_flown_then_its_output_is_that_of_the_library(
 
 
 def test_when_a_system_names_its_signals_then_the_run_has_these_names_and_units(tmp_path: Path) -> None:
+    import control
+
     run = flown(control.ss(A, B, C, 0, **NAMED), tmp_path)
     assert {"angle", "estimate_rate", "motor"} <= set(run.names)
     assert (run.units["angle"], run.units["motor"], run.units["estimate_rate"]) == ("rad", "V", "rad/s")
@@ -63,13 +68,15 @@ def test_when_a_system_names_its_signals_then_the_run_has_these_names_and_units(
 def test_when_an_encoder_is_given_then_the_outputs_that_it_is_for_are_read_by_it(
     field: str, value: float, step: float, right_is_exact: bool, tmp_path: Path
 ) -> None:
-    run = flown(MASSES, tmp_path, settings={f"transmitter.encoders.{field}": value})
+    run = flown(masses(), tmp_path, settings={f"transmitter.encoders.{field}": value})
     counts = run.measured_left / step
     assert abs(counts - counts.round()).max() < 1e-6
     assert (run.measured_right == run.right).all() == right_is_exact
 
 
 def test_when_coder_constants_are_given_then_they_are_flown(tmp_path: Path) -> None:
+    import control
+
     coder = flown(control.ss(A, B, C, 0), tmp_path, settings={"coder.step": 0.9}).config.coder
     assert coder.model_dump()["step"] == 0.9
 
@@ -77,6 +84,8 @@ def test_when_coder_constants_are_given_then_they_are_flown(tmp_path: Path) -> N
 def test_when_a_run_is_moved_then_its_set_points_move_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    import control
+
     monkeypatch.chdir(tmp_path)
     flown(control.ss(A, B, C, 0), Path("here"), reference=lambda t: 0.1 * t)
     Path("here").rename("there")
@@ -107,6 +116,8 @@ def test_when_nothing_says_the_timing_then_it_follows_from_rate_and_step(
     period_s: float,
     bits: int,
 ) -> None:
+    import control
+
     system = control.ss(A, B, C, 0)
     found = matrices(control.sample_system(system, dt) if dt else system)
     settings = settings_of(found, rate_baud, over)
@@ -128,6 +139,8 @@ def test_when_a_system_is_not_linear_then_it_is_flown_as_it_is(tmp_path: Path) -
 
 
 def test_when_a_plant_is_not_linear_then_it_moves_as_its_equation_says(tmp_path: Path) -> None:
+    import scipy.integrate
+
     settings = {**UNDISTURBED, "transmitter.plant.initial": 0.8}
     run = flown(pendulum(), tmp_path, settings=settings)
     state = np.array([0.8, 0.0])
@@ -144,6 +157,8 @@ def test_when_a_plant_is_not_linear_then_it_moves_as_its_equation_says(tmp_path:
 
 
 def test_when_a_preset_flies_another_plant_then_only_the_plant_is_exchanged(tmp_path: Path) -> None:
+    import control
+
     falling = control.nlsys(
         lambda t, x, u, params: [x[1], 7.32**2 * math.sin(x[0]) + 4.0 * u[0]],
         lambda t, x, u, params: x[:1],
@@ -156,34 +171,40 @@ def test_when_a_preset_flies_another_plant_then_only_the_plant_is_exchanged(tmp_
     assert 0.0 < abs(run.angle[-100:]).max() < 0.02
 
 
-MOTOR = control.ss([[0.0, 1.0], [0.0, -4.0]], [[0.0], [4.0]], [[1.0, 0.0]], 0)
-STEPPED = control.c2d(MOTOR, 0.01)
+def discrete(kind: str) -> tuple[Any, Any]:
+    """Return a motor in one of its forms, and what it is in steps of 0.01 s."""
+    import control
+    import scipy.signal
 
-
-@pytest.mark.parametrize(
-    "system",
-    [
-        control.sample_system(MOTOR, 0.03),
-        scipy.signal.StateSpace(STEPPED.A, STEPPED.B, STEPPED.C, STEPPED.D, dt=0.01),
-        scipy.signal.TransferFunction([4.0], [1.0, 4.0, 0.0]),
-        control.nlsys(
-            lambda t, x, u, params: STEPPED.A @ x + STEPPED.B @ u,
+    motor = control.ss([[0.0, 1.0], [0.0, -4.0]], [[0.0], [4.0]], [[1.0, 0.0]], 0)
+    stepped = control.c2d(motor, 0.01)
+    forms = {
+        "step of three ticks": control.sample_system(motor, 0.03),
+        "scipy": scipy.signal.StateSpace(stepped.A, stepped.B, stepped.C, stepped.D, dt=0.01),
+        "transfer function": scipy.signal.TransferFunction([4.0], [1.0, 4.0, 0.0]),
+        "not linear": control.nlsys(
+            lambda t, x, u, params: stepped.A @ x + stepped.B @ u,
             lambda t, x, u, params: x[:1],
             inputs=1,
             outputs=1,
             states=2,
             dt=0.01,
         ),
-    ],
-    ids=["step of three ticks", "scipy", "transfer function", "not linear"],
-)
+    }
+    return forms[kind], stepped
+
+
+@pytest.mark.parametrize("system", ["step of three ticks", "scipy", "transfer function", "not linear"])
 def test_when_a_plant_is_discrete_then_it_moves_at_the_speed_of_its_own_time(
-    system: Any, tmp_path: Path
+    system: str, tmp_path: Path
 ) -> None:
+    import control
+
+    plant, stepped = discrete(system)
     exact = {"transmitter.encoders.quantised": False}
-    run = flown("servo-10baud", tmp_path, plant=system, settings={**UNDISTURBED, **exact})
+    run = flown("servo-10baud", tmp_path, plant=plant, settings={**UNDISTURBED, **exact})
     held = np.concatenate([run.voltage[:-1], [0.0]])
-    expected = control.forced_response(STEPPED, np.arange(len(held)) * 0.01, held)
+    expected = control.forced_response(stepped, np.arange(len(held)) * 0.01, held)
     assert abs(expected.outputs).max() > 0.1
     assert abs(expected.outputs - run.angle).max() < 1e-9
 
@@ -218,6 +239,8 @@ PID = {f"receiver.pid.{name}": value for name, value in (("proportional", 8.0), 
 def test_when_a_controller_is_given_in_any_form_then_it_reaches_the_set_point(
     controller: Any, settings: dict[str, Any], tmp_path: Path
 ) -> None:
+    import control
+
     given = {"duration_s": 12.0, **UNDISTURBED, **settings}
     run = flown(
         control.ss(A, B, C, 0, **NAMED), tmp_path, controller=controller, reference=0.4, settings=given
@@ -226,6 +249,8 @@ def test_when_a_controller_is_given_in_any_form_then_it_reaches_the_set_point(
 
 
 def test_when_an_object_controls_then_it_has_set_points_of_its_own(tmp_path: Path) -> None:
+    import control
+
     class Own(Law):
         def __init__(self) -> None:
             pass
@@ -291,14 +316,14 @@ def test_when_a_set_point_replaces_that_of_a_preset_then_nothing_of_it_stays(
 
 
 def test_when_two_processes_fly_it_then_values_over_time_reach_both(tmp_path: Path) -> None:
-    run = flown(MASSES, tmp_path, reference=lambda t: 0.1 * t, link="zenoh")
+    run = flown(masses(), tmp_path, reference=lambda t: 0.1 * t, link="zenoh")
     assert run.reference_left[-1] == pytest.approx(0.1 * run.time_s[-1])
     assert run.summary["link"] == "zenoh"
     assert run.summary["outputs"]["left"]["tracking_rms"] > 0.0
 
 
 def test_when_a_run_is_plotted_then_every_output_and_input_has_a_panel(tmp_path: Path) -> None:
-    figure: Any = flown(MASSES, tmp_path, reference=[0.5, -0.2]).plot(tmp_path / "flight.png")
+    figure: Any = flown(masses(), tmp_path, reference=[0.5, -0.2]).plot(tmp_path / "flight.png")
     labels = " ".join(panel.get_ylabel() for panel in figure.axes)
     for word in ("left", "right", "input 1", "error", "range", "bits"):
         assert word in labels

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import orjson
-import pandas as pd
 import pyarrow
 import pytest
 from mcap.writer import Writer
@@ -27,6 +26,8 @@ VOLTS = np.cos(TIME)
 
 
 def test_parquet_reads_the_wanted_columns_only(tmp_path: Path) -> None:
+    import pandas as pd
+
     path = tmp_path / "log.parquet"
     frame = {
         "when": pd.to_datetime(TIME + 1e9, unit="s"),
@@ -156,6 +157,8 @@ def test_a_damaged_file_is_named(tmp_path: Path, read: Any) -> None:
 
 @pytest.mark.parametrize("name", ["npz", "npy", "mat", "parquet", "tdms", "mcap"])
 def test_a_corrupt_file_is_read_or_refused(tmp_path: Path, name: str) -> None:
+    import pandas as pd
+
     path = tmp_path / f"log.{name}"
     with TdmsWriter(tmp_path / "log.tdms") as writer:
         writer.write_segment([ChannelObject("Log", "theta", THETA, {"wf_increment": 0.02})])

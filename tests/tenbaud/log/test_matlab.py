@@ -6,11 +6,8 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import matio
 import numpy as np
-import pandas as pd
 import pytest
-from matio.utils import MatlabOpaque
 from scipy.io import savemat
 
 from tenbaud.log.matlab import read_matlab
@@ -27,6 +24,8 @@ VERSIONS = ("v7", "v7.3")
 def written(folder: Path, version: str = "5", **variables: Any) -> Path:
     path = folder / "run.mat"
     if version in VERSIONS:
+        import matio
+
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # durations are written in milliseconds, as MATLAB does
             matio.save_to_mat(str(path), variables, version=version)
@@ -35,8 +34,10 @@ def written(folder: Path, version: str = "5", **variables: Any) -> Path:
     return path
 
 
-def series(name: str, values: np.ndarray, unit: str = "", explicit: bool = True) -> MatlabOpaque:
+def series(name: str, values: np.ndarray, unit: str = "", explicit: bool = True) -> Any:
     """Return a `timeseries`, its times as a vector or by start and increment alone."""
+    from matio.utils import MatlabOpaque
+
     about = {
         "Start_": np.array([[0.0]]),
         "Increment_": np.array([[np.nan if explicit else 0.0333]]),
@@ -53,8 +54,10 @@ def series(name: str, values: np.ndarray, unit: str = "", explicit: bool = True)
     return MatlabOpaque(fields, "timeseries")
 
 
-def logged(**signals: np.ndarray) -> MatlabOpaque:
+def logged(**signals: np.ndarray) -> Any:
     """Return a Simulink Dataset of logged signals."""
+    from matio.utils import MatlabOpaque
+
     elements = np.empty((1, len(signals)), dtype=object)
     for place, (name, values) in enumerate(signals.items()):
         fields = {"Name": np.array([name]), "Values": series("", values)}
@@ -144,6 +147,8 @@ def test_a_dataset_of_logged_signals(tmp_path: Path, version: str) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_tables_and_timetables(tmp_path: Path, version: str) -> None:
+    import pandas as pd
+
     frame = pd.DataFrame({"theta": THETA, "u": VOLTS, "who": ["x"] * ROWS})
     check(read_matlab(written(tmp_path, version, T=frame)), theta=THETA, u=VOLTS)
     timed = frame[["theta", "u"]].set_index(pd.to_timedelta(TIME, unit="s"))

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from channel.codec.models.helicopter import HELICOPTER_SIGNALS
 from channel.codec.models.pendulum import PENDULUM_SIGNALS
@@ -26,6 +25,8 @@ def curve_of(times: Series, values: Series) -> Curve:
 
 def drawn(plant: Signals, true: list[Curve], estimated: list[Curve]) -> list[list[Series]]:
     """Return the points of every line of each moment."""
+    from matplotlib.figure import Figure
+
     panel = Figure().add_subplot()
     draw_poses(panel, plant, true, estimated)
     return [[line.get_xydata() for line in moment.lines] for moment in panel.child_axes]

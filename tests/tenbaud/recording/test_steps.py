@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
 import pytest
 
@@ -12,6 +11,8 @@ TICK_S = 0.01
 
 
 def second_order(damping: float, rate_rad_s: float, time_s: np.ndarray) -> np.ndarray:
+    import control
+
     system = control.tf([rate_rad_s**2], [1.0, 2.0 * damping * rate_rad_s, rate_rad_s**2])
     return np.asarray(control.step_response(system, T=time_s).outputs)
 
@@ -22,6 +23,8 @@ def second_order(damping: float, rate_rad_s: float, time_s: np.ndarray) -> np.nd
 def test_a_second_order_response_has_the_figures_of_python_control(
     damping: float, size: float, band: float
 ) -> None:
+    import control
+
     time_s = np.arange(2000) * TICK_S
     values = size * second_order(damping, 2.0, time_s)
     expected = control.step_info(values, T=time_s, yfinal=size, SettlingTimeThreshold=band)

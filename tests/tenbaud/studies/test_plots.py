@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -20,6 +19,8 @@ from tenbaud.studies.plots import draw_study
 @pytest.fixture(name="figures")
 def kept_figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """The figures that are drawn, by the names of their files."""
+    import matplotlib.pyplot as plt
+
     kept: dict[str, Any] = {}
 
     def save(figure: Any, path: Path) -> Path:

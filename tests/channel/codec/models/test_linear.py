@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
 import pytest
 
@@ -20,6 +19,8 @@ C = ((1.0, 0.0),)
 
 @pytest.mark.parametrize("name", plant_names())
 def test_when_a_plant_is_driven_then_its_outputs_are_those_of_control(name: str) -> None:
+    import control
+
     plant = plant_of(plant_section(name), TICK_S)
     assert plant is not None
     transition, drive = discretised(plant.A, plant.B, TICK_S)

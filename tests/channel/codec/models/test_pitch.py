@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from channel.codec.codec import CodecState, Vector, Word
 from channel.codec.models.pitch import PitchModel, PitchParameters
@@ -31,6 +30,8 @@ def slope(_time: float, state: np.ndarray, command: Vector, held: Vector) -> lis
 
 
 def solved(start: Vector, command: Vector, held: Vector, seconds: float) -> Vector:
+    from scipy.integrate import solve_ivp
+
     solution = solve_ivp(
         slope, (0.0, seconds), start, args=(command, held), method="DOP853", rtol=1e-12, atol=1e-13
     )

@@ -36,8 +36,8 @@ PRESETS = {
     "integrator-10baud": Flown(10.0, 3.0, {"angle": 0.005}, {"angle": 1.0}),
     "servo-10baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 1.5}),
     "aero-20baud": Flown(10.0, 3.0, {"pitch": 0.006, "yaw": 0.006}, {"pitch": 0.5, "yaw": 1.0}),
-    "furuta-50baud": Flown(10.0, 3.0, {"arm": 0.02, "pendulum": 0.01}, {"arm": 0.6, "pendulum": 0.2}),
-    "heading-1baud": Flown(100.0, 6.0, {"heading": 0.01}, {"heading": 0.6}),
+    "furuta-50baud": Flown(10.0, 2.0, {"arm": 0.02, "pendulum": 0.01}, {"arm": 0.6, "pendulum": 0.2}),
+    "heading-1baud": Flown(100.0, 4.0, {"heading": 0.01}, {"heading": 0.6}),
     "helicopter-10baud": Flown(
         10.0,
         3.0,

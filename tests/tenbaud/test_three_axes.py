@@ -55,9 +55,10 @@ def flown(folder: Path, seconds: float, **settings: Any) -> Run:
 
 
 def at(run: Run, signal: str, time_s: float) -> float:
-    """Return a signal's mean over the second that begins then."""
+    """Return a signal's mean over the second that begins then; a missed tick has no value."""
     times_s = np.asarray(run.time_s)
-    return float(run.signals[signal].values[(times_s >= time_s) & (times_s < time_s + 1.0)].mean())
+    second = (times_s >= time_s) & (times_s < time_s + 1.0)
+    return float(np.nanmean(run.signals[signal].values[second]))
 
 
 @pytest.mark.parametrize("seconds", [16.0, pytest.param(85.0, marks=pytest.mark.soak)])
@@ -221,14 +222,14 @@ def test_an_emulated_rig_turns_three_encoders(form: str, tmp_path: Path) -> None
     rig = RigProcess(form, "--watchdog", "1", *mission, *(TCP if vectors else ()), *vectors)
     try:
         address = ("--rig", f"{form}:{rig.address}", "--clock", "real", *STALE)
-        command = ("demo", "--json", *mission, *vectors, *address, "--duration", "8", "--out", "run")
+        command = ("demo", "--json", *mission, *vectors, *address, "--duration", "6", "--out", "run")
         done = run_command(*command, cwd=tmp_path)
     finally:
         device = rig.end()
     assert done.code == 0, done.err
-    check_flown(done.summary, 80)
+    check_flown(done.summary, 60)
     assert (device["volts"], device["enabled"]) == ([0.0, 0.0], False)
-    assert at(Run(tmp_path / "run"), "measured_elevation", 7.0) > 0.08, "it has taken off"
+    assert at(Run(tmp_path / "run"), "measured_elevation", 5.0) > 0.15, "it has taken off"
     need_idle(done.summary)
     for name, output in done.summary["outputs"].items():
         assert output["error_live_rms"] < 0.02, name

@@ -111,9 +111,7 @@ def test_when_the_receiver_is_too_slow_then_it_says_so_and_the_flight_goes_on() 
     assert counts["rejoins"] <= TICKS * TICK_S / 0.05, "at most one answer's age apart"
 
 
-def test_when_the_transmitter_is_too_slow_then_it_says_so_and_no_common_state_is_asked_for() -> (
-    None
-):
+def test_when_the_transmitter_is_too_slow_then_it_says_so_and_no_common_state_is_asked_for() -> None:
     with Pacer() as pacer:
         flight = flown(SlowRig, ConstantController(1.0, -1.0))
     check_reported(flight)

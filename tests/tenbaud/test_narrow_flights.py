@@ -26,7 +26,7 @@ FAULTS = "loss=0.03,flip=0.02,delay=15ms±5ms,duplicate=0.1,up:cut=4s+0.3s,down:
 
 def flown_over(link: str, folder: Path, *arguments: str) -> tuple[RunFolder, dict[str, Any]]:
     """Fly the demo on the virtual clock; return its folder and its summary."""
-    common = ("--json", "--duration", "15", "--mismatch", "0.1", "--clock", "virtual", *NARROW)
+    common = ("--json", "--duration", "12", "--mismatch", "0.1", "--clock", "virtual", *NARROW)
     ended = run("demo", "--link", link, "--out", link, *common, *arguments, cwd=folder)
     assert ended.code == 0, ended.err
     return RunFolder(folder / link), ended.summary

@@ -113,7 +113,7 @@ def test_the_node_flies_with_a_receiver_and_every_digest_is_equal(
 ) -> None:
     with EmulatedLine(tmp_path, 115_200) as line:
         receiver = receive(line, tmp_path)
-        with node_at(program, line.transmitter_port, 5.0) as node:
+        with node_at(program, line.transmitter_port, 4.0) as node:
             assert node.finish() == 0
         ended = finish(receiver)
     assert ended.code == 0, ended.err

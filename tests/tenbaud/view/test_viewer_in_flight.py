@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc"),
 ]
 
-DURATION_S = 5
+DURATION_S = 4
 STOPPED_S, RUNNING_S = 0.4, 0.1
 PATIENCE_S = 240.0
 
@@ -74,4 +74,4 @@ def _wait_until_flying(recording: Path) -> None:
     while not recording.exists() or recording.stat().st_size == 0:
         assert time.monotonic() < until_s, "no flight"
         time.sleep(0.02)
-    time.sleep(1.0)
+    time.sleep(0.5)

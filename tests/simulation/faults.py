@@ -43,6 +43,8 @@ class Plan:
     sabotage: tuple[tuple[str, Sabotage], ...]
     mismatch: float
     watchdog_ticks: int = 50
+    faulty_s: float = FAULTY_S
+    quiet_s: float = QUIET_S
 
     @property
     def overtaking_ticks(self) -> int:

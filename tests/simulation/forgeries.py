@@ -16,7 +16,7 @@ from channel.line.impairments import Impairments, LineFaults
 from tests.simulation.faults import FAULTY_S, Plan, draw
 from tests.simulation.intruded import IntrudedWorld, Intrusion
 
-RATES_HZ = (1.0, 10.0, 100.0, 400.0)
+RATES_HZ = (1.0, 10.0, 100.0, 500.0)
 FLOOD_HZ = 2000.0
 """Long runs only."""
 
@@ -66,4 +66,5 @@ def quiet_plan(seed: int) -> Plan:
         restarts=(),
         outages_ns=(),
         sabotage=(),
+        quiet_s=15.0,
     )

@@ -83,8 +83,9 @@ class IntrudedWorld(World):
     def fly(self) -> IntrudedWorld:
         """Fly as ever, in company until the faults stop."""
         chance = self.intruder.chance
-        for _ in range(round(self.intrusion.rate_hz * FAULTY_S)):
-            self.at(round(chance.uniform(0.0, FAULTY_S) * 1e9), self._inject)
+        faulty_s = self.plan.faulty_s
+        for _ in range(round(self.intrusion.rate_hz * faulty_s)):
+            self.at(round(chance.uniform(0.0, faulty_s) * 1e9), self._inject)
         for start_ns, end_ns in self.intrusion.seconds:
             self.at(start_ns, self._start_second)
             self.at(end_ns, self._stop_second)

@@ -10,17 +10,19 @@ from channel.line.impairments import Impairments
 from channel.protocol.events import EventKind
 from channel.protocol.frames import Symbol
 from channel.protocol.wire import encode
+from tests.simulation.faults import Plan
 from tests.simulation.forgeries import quiet_plan
 from tests.simulation.intruded import IntrudedWorld, Intrusion, draw_intrusion
 from tests.simulation.soak import fly_intruded_seed
 
-SEEDS, FLOWN = 16, 6
-"""`make soak` flies them all, and random ones."""
+SEEDS, FLOWN = 16, (1, 2, 5)
+"""`make soak` flies them all, and random ones. Those flown here have forged frames and a second
+receiver; in two a recording is played back, in one the transmitter is killed."""
 SECOND = 1_000_000_000
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(one, marks=() if one < FLOWN else pytest.mark.soak) for one in range(SEEDS)]
+    "seed", [pytest.param(one, marks=() if one in FLOWN else pytest.mark.soak) for one in range(SEEDS)]
 )
 def test_when_everything_goes_wrong_in_company_then_nothing_is_unsafe_and_it_comes_back(
     seed: int,
@@ -37,9 +39,12 @@ def test_when_seeds_are_drawn_then_they_meet_every_kind_of_company() -> None:
     assert {one.replayed_share for one in drawn} == {0.0, 0.5, 1.0}
 
 
+def shorter() -> Plan:
+    return replace(quiet_plan(3), faulty_s=10.0)
+
+
 def test_when_a_second_receiver_comes_to_a_healthy_flight_then_it_is_refused_for_nothing() -> None:
-    plan = quiet_plan(3)
-    world = IntrudedWorld(plan, Intrusion(seconds=((5 * SECOND, 15 * SECOND),))).fly()
+    world = IntrudedWorld(shorter(), Intrusion(seconds=((2 * SECOND, 8 * SECOND),))).fly()
     assert world.node is not None
     session = world.node.session
     assert world.faults["second receivers"] == 1
@@ -48,7 +53,7 @@ def test_when_a_second_receiver_comes_to_a_healthy_flight_then_it_is_refused_for
 
 
 def test_when_a_flight_is_played_back_into_itself_then_it_does_not_rejoin() -> None:
-    world = IntrudedWorld(quiet_plan(3), Intrusion(rate_hz=50.0, replayed_share=1.0)).fly()
+    world = IntrudedWorld(shorter(), Intrusion(rate_hz=100.0, replayed_share=1.0)).fly()
     assert world.node is not None
     assert world.intruder.counts["replayed"] > 500
     assert world.watch.rejoins == world.watch.desyncs_raised == 0
@@ -56,7 +61,7 @@ def test_when_a_flight_is_played_back_into_itself_then_it_does_not_rejoin() -> N
 
 
 def test_when_one_forged_symbol_comes_early_then_the_flight_keeps_its_schedule() -> None:
-    plan = replace(quiet_plan(3), up=Impairments(), down=Impairments())
+    plan = replace(shorter(), up=Impairments(), down=Impairments())
     world = IntrudedWorld(plan, Intrusion())
     taken: list[int] = []
 

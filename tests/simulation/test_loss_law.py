@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.reliability import FAULTS, Case, Flown, fly
 
-SECONDS = 110.0
+SECONDS = 80.0
 
 
 @pytest.fixture(scope="module")

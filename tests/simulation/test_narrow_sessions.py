@@ -18,7 +18,7 @@ from tests.simulation.narrow import coded, mirrored
 from tests.simulation.narrow_sessions import Announced, TimedFlight, memory_flight, narrow_terms
 from tests.simulation.test_narrow import DIRECTION, announced, pid
 
-SAMPLES = 100
+SAMPLES = 70
 LOSSES = Faults(loss_up=0.01, loss_down=0.03)
 SCHEMES = {
     "mirrored 1": (mirrored(Layout(1, 1, 8), 40), 40),

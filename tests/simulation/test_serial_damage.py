@@ -81,7 +81,7 @@ def damage_both_ways(samples: int) -> None:
 
 
 def test_when_symbol_bytes_are_damaged_then_the_copies_stay_in_lockstep() -> None:
-    uplink_damage(4_000)
+    uplink_damage(2_500)
 
 
 def test_when_both_directions_are_damaged_then_no_divergence_is_silent() -> None:

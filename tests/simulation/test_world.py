@@ -15,14 +15,14 @@ from tests.simulation.world import World
 from transmitter.session.owing import Owing
 from transmitter.session.session import TransmitterSession
 
-SEEDS = 6
-MORE_SEEDS = 24
-"""`make soak` flies these too, and random ones."""
+SEEDS, FLOWN = 24, (0, 1, 2, 3)
+"""`make soak` flies them all, and random ones. Of those flown here one has a long lead and a clock that
+jumps, one twenty rejoins; either end is killed, and the line cut in each direction and in both."""
 
 
 @pytest.mark.parametrize(
     "seed",
-    [*range(SEEDS), *(pytest.param(one, marks=pytest.mark.soak) for one in range(SEEDS, MORE_SEEDS))],
+    [pytest.param(one, marks=() if one in FLOWN else pytest.mark.soak) for one in range(SEEDS)],
 )
 def test_when_everything_goes_wrong_then_nothing_is_unsafe_and_it_comes_back(seed: int) -> None:
     result = fly_seed(seed)
@@ -65,7 +65,7 @@ def test_when_the_watchdog_counted_ticks_that_are_owed_nothing_then_the_harness_
 
 
 def test_when_the_same_seed_flies_twice_then_everything_is_the_same() -> None:
-    first, second = (World(draw(3)).fly() for _ in range(2))
+    first, second = (World(draw(1)).fly() for _ in range(2))
     assert first.watch.decided_digests == second.watch.decided_digests
     assert len(first.watch.decided_digests) > 100
     assert first.faults == second.faults
@@ -119,7 +119,7 @@ def test_when_one_end_is_corrupted_then_it_is_found_and_corrected_in_time(
 
 
 def plan_of(up: Impairments, down: Impairments) -> Plan:
-    """Return a plan of the paper's flight with these lines and no other fault."""
+    """Return a plan of the paper's flight with these lines and no other fault: a short flight."""
     base = draw(0)
     delay_ns = up.delay_ns + up.jitter_ns + down.delay_ns + down.jitter_ns
     terms = replace(
@@ -131,4 +131,5 @@ def plan_of(up: Impairments, down: Impairments) -> Plan:
         deadline_allowance_ns=20_000_000,
         lead_ticks=3 + delay_ns // 10_000_000,
     )
-    return Plan(0, base.zoom, terms, up, down, LineFaults(), (), (), (), (), 0.1)
+    plan = Plan(0, base.zoom, terms, up, down, LineFaults(), (), (), (), (), 0.1)
+    return replace(plan, faulty_s=10.0, quiet_s=15.0)

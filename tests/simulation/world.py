@@ -29,7 +29,7 @@ from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.references import values_of
 from tests.channel.codec.parts import TICK_NS, TICK_S, identity_of, pitch_codec
-from tests.simulation.faults import FAULTY_S, QUIET_S, Plan
+from tests.simulation.faults import Plan
 from tests.simulation.flight import COUNTS_PER_TURN, REFERENCE
 from tests.simulation.watch import Watch
 from transmitter.endpoint import TransmitterNode
@@ -197,9 +197,9 @@ class World:
             self.at(end_ns, lambda direction=direction: self._cut(direction, 0.0))
         outages = zip(plan.restarts, plan.outages_ns, strict=True)
         last_ns = max((at + outage_ns for (at, _), outage_ns in outages), default=0)
-        self.calm_ns = max(round(FAULTY_S * 1e9), last_ns + 1)
+        self.calm_ns = max(round(plan.faulty_s * 1e9), last_ns + 1)
         self.at(self.calm_ns, self._calm)
-        tick_end_ns = self.calm_ns + round(QUIET_S * 1e9)
+        tick_end_ns = self.calm_ns + round(plan.quiet_s * 1e9)
         for index in range(tick_end_ns // TICK_NS):
             self.at(index * TICK_NS, self._plant_tick)
         self._run(tick_end_ns)

@@ -24,7 +24,7 @@ REAL_FLIGHT = Path(__file__).parents[3] / "shared" / "data" / "uiuc_closed_loop.
 
 
 def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Path) -> None:
-    paper = ("--preset", "paper-10baud", "--mismatch", "0.1")
+    paper = ("--preset", "paper-10baud", "--mismatch", "0.1", "--duration", "60")
     ended = run("demo", "--json", "--figure", *paper, "--out", "run", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
@@ -34,7 +34,7 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
     assert of_output == {name for name in FIELDS if name.startswith("outputs.")}
     assert "usual_loop" in summary
     assert {f"usual_loop.{name}" for name in summary["usual_loop"]} <= FIELDS.keys()
-    assert summary["samples"] == summary["digest_checks"] == summary["coder_bits_up"] == 1000
+    assert summary["samples"] == summary["digest_checks"] == summary["coder_bits_up"] == 600
     assert summary["desyncs"] == summary["erasures"] == summary["commands_late"] == 0
     assert summary["baud_measured"] == pytest.approx(10.0, abs=1e-6)
     assert summary["window_start_s"] == 25.0
@@ -52,7 +52,7 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
             for block in rows_in_blocks(stream, {"tick": None})
             for times, _ in block.values()
         )
-        assert rows == 10_000
+        assert rows == 6_000
         for topic, channel in stream.channels.items():
             for field in channel.fields:
                 assert field.description, (topic, field.name)
@@ -118,7 +118,9 @@ def test_when_the_wire_delivers_at_the_end_of_a_slot_then_it_flies_on_the_provis
 
 
 @pytest.mark.real_time
-def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_path: Path) -> None:
+def test_when_flown_on_every_clock_and_link_then_the_states_are_identical_and_ten_baud_are_measured(
+    tmp_path: Path,
+) -> None:
     # The lead leaves a busy machine time; what it misses all the same makes it another flight.
     flown = ["--lead", "105", "--set", "channel.deadline_allowance_s=1", *PATIENT]
     flown += ["--duration", "3", "--mismatch", "0.1", "--disturbance", "q=2e-3"]
@@ -131,23 +133,12 @@ def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_pa
         assert ended.code == 0, ended.err
         check_flown(ended.summary, 30)
         if name == "real":
+            assert ended.summary["loop_late_ms_p99"] is not None
             need_idle(ended.summary)
+            assert ended.summary["baud_measured"] == pytest.approx(10.0, abs=0.1)
     for other in ("virtual", "memory"):
         compared = compare_runs(tmp_path / "real", tmp_path / other)
         assert compared.verdict is Verdict.EQUAL, f"real and {other}: {compared}"
-
-
-@pytest.mark.real_time
-@pytest.mark.both_cores
-def test_when_the_real_clock_flies_then_the_receiver_measures_the_baud_rate(tmp_path: Path) -> None:
-    flight = ("--clock", "real", "--duration", "5", *PATIENT)
-    ended = run("demo", "--json", *flight, cwd=tmp_path)
-    assert ended.code == 0, ended.err
-    summary = ended.summary
-    check_flown(summary, 50)
-    assert summary["loop_late_ms_p99"] is not None
-    need_idle(summary)
-    assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1)
 
 
 def test_when_the_seed_changes_then_the_disturbed_flight_changes(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from tests.tenbaud.confirmed import check_flown, need_idle
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 from tests.tenbaud.ends import wait_for
 
-SECONDS = 5.0
+SECONDS = 3.0
 SOAK_SECONDS = 60.0
 OFF = [0.0, 0.0]
 TCP = ("--port", "tcp:127.0.0.1:0")

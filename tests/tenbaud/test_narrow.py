@@ -56,7 +56,7 @@ def test_a_flight_and_what_reads_it_keep_to_the_width(columns: int, tmp_path: Pa
     sweep = ("sweep", "study.toml", "--workers", "1", "--no-plots", "--out", "s")
     outputs = {
         "demo": shown(
-            columns, *("demo", "--link", "memory", "--duration", "200", "--out", "run"), cwd=tmp_path
+            columns, *("demo", "--link", "memory", "--duration", "60", "--out", "run"), cwd=tmp_path
         ),
         "inspect": shown(columns, "inspect", "run", cwd=tmp_path),
         "presets": shown(columns, "presets", cwd=tmp_path),

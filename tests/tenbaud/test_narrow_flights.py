@@ -26,7 +26,7 @@ FAULTS = "loss=0.03,flip=0.02,delay=15ms±5ms,duplicate=0.1,up:cut=4s+0.3s,down:
 
 def flown_over(link: str, folder: Path, *arguments: str) -> tuple[RunFolder, dict[str, Any]]:
     """Fly the demo on the virtual clock; return its folder and its summary."""
-    common = ("--json", "--duration", "15", "--mismatch", "0.1", "--clock", "virtual", *NARROW)
+    common = ("--json", "--duration", "12", "--mismatch", "0.1", "--clock", "virtual", *NARROW)
     ended = run("demo", "--link", link, "--out", link, *common, *arguments, cwd=folder)
     assert ended.code == 0, ended.err
     return RunFolder(folder / link), ended.summary
@@ -65,7 +65,7 @@ def check_equal_where_confirmed(flown: Flown) -> None:
 @pytest.mark.real_time
 def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
     with EmulatedLine(tmp_path, 300) as line:
-        flown = fly(line, narrow_settings(line_rate_baud=300))
+        flown = fly(line, {**narrow_settings(line_rate_baud=300), "duration_s": 3.0})
         carried = line.carried("down")
     meter = flown.receiver.downlink.meter
     assert meter.wire_bytes == meter.symbols + meter.control_bytes >= carried
@@ -74,10 +74,10 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
         pytest.skip("the machine was too busy for the symbols' times")
     assert flown.outcome.code is ExitCode.OK, flown.outcome.text
     check_equal_where_confirmed(flown)
-    assert 100 <= meter.symbols <= 104
-    assert carried >= 100
+    assert 60 <= meter.symbols <= 64
+    assert carried >= 60
     endpoint = flown.transmitter.endpoint
-    assert endpoint.inlet.meter.symbols >= 98  # the last ones may come after the end
+    assert endpoint.inlet.meter.symbols >= 58  # the last ones may come after the end
     assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
 
 
@@ -96,7 +96,7 @@ def test_when_bytes_are_damaged_and_the_plug_is_out_then_no_wrong_state_is_confi
             time.sleep(0.4)
             line.plug()
 
-        flown = fly(line, {**narrow_settings(), "duration_s": 14.0}, disturb)
+        flown = fly(line, {**narrow_settings(), "duration_s": 8.0}, disturb)
         assert line.damaged["down"] > 0
     # On a busy machine fewer samples are confirmed than a flight needs to be called flown.
     assert flown.outcome.code in (ExitCode.OK, ExitCode.NOT_FLOWN), flown.outcome.text

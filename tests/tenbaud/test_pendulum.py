@@ -30,7 +30,7 @@ def flown(seconds: float, **settings: object) -> FlightResult:
 def test_it_stands_as_two_processes_on_either_clock(tmp_path: Path, clock: str) -> None:
     folder = tmp_path / "run"
     done = run_command(
-        *("demo", "--preset", PRESET, "--clock", clock, "--duration", "3", "--out", str(folder)),
+        *("demo", "--preset", PRESET, "--clock", clock, "--duration", "2", "--out", str(folder)),
         cwd=tmp_path,
     )
     assert done.code == 0, done.err

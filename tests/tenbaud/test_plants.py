@@ -36,8 +36,8 @@ PRESETS = {
     "integrator-10baud": Flown(10.0, 3.0, {"angle": 0.005}, {"angle": 1.0}),
     "servo-10baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 1.5}),
     "aero-20baud": Flown(10.0, 3.0, {"pitch": 0.006, "yaw": 0.006}, {"pitch": 0.5, "yaw": 1.0}),
-    "furuta-50baud": Flown(10.0, 3.0, {"arm": 0.02, "pendulum": 0.01}, {"arm": 0.6, "pendulum": 0.2}),
-    "heading-1baud": Flown(100.0, 6.0, {"heading": 0.01}, {"heading": 0.6}),
+    "furuta-50baud": Flown(10.0, 2.0, {"arm": 0.02, "pendulum": 0.01}, {"arm": 0.6, "pendulum": 0.2}),
+    "heading-1baud": Flown(100.0, 4.0, {"heading": 0.01}, {"heading": 0.6}),
     "helicopter-10baud": Flown(
         10.0,
         3.0,
@@ -57,7 +57,7 @@ MORE = {
         10.0, 3.0, {"travel": 0.02, "elevation": 0.02, "pitch": 0.03}, HELICOPTER, 3
     ),
     "helicopter-usual": Flown(
-        4.0, 1.0, {"travel": 0.005, "elevation": 0.01, "pitch": 0.02}, HELICOPTER, 12
+        2.0, 1.0, {"travel": 0.005, "elevation": 0.01, "pitch": 0.02}, HELICOPTER, 12
     ),
     "pendulum-16baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 0.3}),
     "pendulum-20baud": Flown(10.0, 3.0, {"angle": 0.006}, {"angle": 0.2}),
@@ -66,6 +66,8 @@ MORE = {
 ALIKE = ("integrator-10baud", "servo-10baud", "aero-20baud", "pendulum-13baud", "helicopter-usual")
 """Those that differ in memory alone; two processes fly them in the long tests. The others have the
 shortest and the longest period, the most outputs, and words of several bits."""
+BETWEEN = ("helicopter-20baud", "pendulum-16baud")
+"""Between two other rates of their plant: they fly in the long tests."""
 WORDS = tuple(preset for preset, flown in MORE.items() if flown.bits > 1)
 """Those that differ between two processes too: a sample has several bits."""
 
@@ -78,7 +80,13 @@ def check(preset: str, summary: dict[str, Any], tolerance: float = 1.0) -> None:
         assert output["largest"] < flown.reach[name], name
 
 
-@pytest.mark.parametrize("preset", PRESETS | MORE)
+@pytest.mark.parametrize(
+    "preset",
+    [
+        pytest.param(preset, marks=[pytest.mark.soak] if preset in BETWEEN else [])
+        for preset in PRESETS | MORE
+    ],
+)
 def test_it_flies_in_memory_and_every_output_is_known(preset: str, tmp_path: Path) -> None:
     seconds = (PRESETS | MORE)[preset].seconds
     run = fly(preset, settings={"duration_s": seconds}, out=tmp_path / "run")
@@ -127,7 +135,7 @@ def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) ->
 
 
 def test_when_the_helicopter_is_off_then_its_flight_says_by_how_much(tmp_path: Path) -> None:
-    settings = {"duration_s": 30.0, "transmitter.plant.mismatch": (0.1, -0.1, 0.1)}
+    settings = {"duration_s": 20.0, "transmitter.plant.mismatch": (0.1, -0.1, 0.1)}
     run = fly("helicopter-10baud", settings=settings, out=tmp_path / "run")
     learned = run.summary["learned"]
     for name, off in (("pitch_thrust", 0.1), ("elevation_weight", -0.1), ("elevation_thrust", 0.1)):

@@ -55,12 +55,13 @@ def flown(folder: Path, seconds: float, **settings: Any) -> Run:
 
 
 def at(run: Run, signal: str, time_s: float) -> float:
-    """Return a signal's mean over the second that begins then."""
+    """Return a signal's mean over the second that begins then; a missed tick has no value."""
     times_s = np.asarray(run.time_s)
-    return float(run.signals[signal].values[(times_s >= time_s) & (times_s < time_s + 1.0)].mean())
+    second = (times_s >= time_s) & (times_s < time_s + 1.0)
+    return float(np.nanmean(run.signals[signal].values[second]))
 
 
-@pytest.mark.parametrize("seconds", [16.0, pytest.param(85.0, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("seconds", [12.0, pytest.param(85.0, marks=pytest.mark.soak)])
 def test_it_takes_off_from_its_rest_and_goes_where_the_mission_says(
     seconds: float, tmp_path: Path
 ) -> None:
@@ -113,8 +114,8 @@ def test_a_mass_sent_along_the_arm_lowers_it(tmp_path: Path) -> None:
 
 
 def test_travel_is_steered_by_the_pitch_in_a_cascade_of_loops(tmp_path: Path) -> None:
-    run = flown(tmp_path, 14.0, receiver=CASCADE)
-    assert at(run, "travel", 12.0) == pytest.approx(0.4, abs=0.12)
+    run = flown(tmp_path, 12.0, receiver=CASCADE)
+    assert at(run, "travel", 11.0) == pytest.approx(0.4, abs=0.12)
     assert at(run, "elevation", 8.0) == pytest.approx(0.2745, abs=0.12)
     assert "reference_pitch" not in run.signals or np.isnan(run.signals["reference_pitch"].values).all()
     assert np.abs(run.signals["pitch"].values).max() < 0.45, "its set-point is bounded"
@@ -165,7 +166,7 @@ def test_a_rig_of_two_encoders_is_refused_with_the_axis_that_lacks_one() -> None
 
 def test_lost_and_flipped_bits_and_a_corrupt_codec_are_survived(tmp_path: Path) -> None:
     done = run_command(
-        *("demo", "--json", "--preset", "helicopter-10baud", "--link", "memory", "--duration", "12"),
+        *("demo", "--json", "--preset", "helicopter-10baud", "--link", "memory", "--duration", "8"),
         *("--impair", "up:loss=0.1,up:flip=0.02", "--sabotage", "sample=40,field=model.4"),
         *("--out", "run"),
         cwd=tmp_path,
@@ -221,14 +222,14 @@ def test_an_emulated_rig_turns_three_encoders(form: str, tmp_path: Path) -> None
     rig = RigProcess(form, "--watchdog", "1", *mission, *(TCP if vectors else ()), *vectors)
     try:
         address = ("--rig", f"{form}:{rig.address}", "--clock", "real", *STALE)
-        command = ("demo", "--json", *mission, *vectors, *address, "--duration", "8", "--out", "run")
+        command = ("demo", "--json", *mission, *vectors, *address, "--duration", "6", "--out", "run")
         done = run_command(*command, cwd=tmp_path)
     finally:
         device = rig.end()
     assert done.code == 0, done.err
-    check_flown(done.summary, 80)
+    check_flown(done.summary, 60)
     assert (device["volts"], device["enabled"]) == ([0.0, 0.0], False)
-    assert at(Run(tmp_path / "run"), "measured_elevation", 7.0) > 0.08, "it has taken off"
+    assert at(Run(tmp_path / "run"), "measured_elevation", 5.0) > 0.15, "it has taken off"
     need_idle(done.summary)
     for name, output in done.summary["outputs"].items():
         assert output["error_live_rms"] < 0.02, name

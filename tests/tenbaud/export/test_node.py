@@ -113,7 +113,7 @@ def test_the_node_flies_with_a_receiver_and_every_digest_is_equal(
 ) -> None:
     with EmulatedLine(tmp_path, 115_200) as line:
         receiver = receive(line, tmp_path)
-        with node_at(program, line.transmitter_port, 5.0) as node:
+        with node_at(program, line.transmitter_port, 4.0) as node:
             assert node.finish() == 0
         ended = finish(receiver)
     assert ended.code == 0, ended.err
@@ -151,7 +151,7 @@ def test_a_node_that_was_killed_joins_again_after_its_reboot(program: Path, tmp_
             node.wait_for(10)
             flown = node.counts["sample"]
             node.kill()
-        with node_at(program, line.transmitter_port, 5.0) as again:
+        with node_at(program, line.transmitter_port, 3.0) as again:
             assert again.finish() == 0
         ended = finish(receiver)
     assert ended.code == 0, ended.err
@@ -217,12 +217,13 @@ def test_noise_and_garbage_on_the_line_cost_words_and_never_lockstep(
 ) -> None:
     with NoisyLine(tmp_path, 115_200, seed=7) as line:
         receiver = receive(line, tmp_path)
-        with node_at(program, line.transmitter_port, 8.0) as node:
+        with node_at(program, line.transmitter_port, 60.0) as node:
             node.wait_for(5)
             line.inject("down", bytes(range(256)) * 8)
             line.corrupt("down", 0.001)
             line.corrupt("up", 0.05)
-            node.finish()
+            node.wait_for(node.counts["sample"] + 30)
+            node.kill()
         line.corrupt("up", 0.0)
         receiver.send_signal(signal.SIGINT)
         finish(receiver)

@@ -126,7 +126,7 @@ def in_terminal(folder: Path, *arguments: str, **environment: str) -> str:
     process = subprocess.Popen(
         [sys.executable, "-m", "tenbaud", *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": path, "TERM": "xterm", "PYTHONUTF8": "1", **environment},
+        env={**os.environ, "PYTHONPATH": path, "TERM": "xterm", **environment},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=theirs,

@@ -41,7 +41,10 @@ def test_when_the_plant_is_pushed_then_the_density_is_found(preset: str, density
     assert summary["disturbance_density"] == pytest.approx(density, rel=0.35)
 
 
-@pytest.mark.parametrize(("plant", "rate"), [("helicopter", 33), ("furuta", 50), ("heading", 5)])
+@pytest.mark.parametrize(
+    ("plant", "rate"),
+    [("helicopter", 33), pytest.param("furuta", 50, marks=pytest.mark.soak), ("heading", 5)],
+)
 def test_any_linear_plant_has_its_density_found_and_its_error_over_the_floor(
     plant: str, rate: int
 ) -> None:
@@ -51,6 +54,7 @@ def test_any_linear_plant_has_its_density_found_and_its_error_over_the_floor(
     density = model["densities"][0]
     summary, recorder = fly(
         "paper-10baud",
+        45.0,
         **changed,
         receiver={"controller": "state_feedback", "reference": {"kind": "constant", "amplitude": 0.0}},
         limits={"command_max": 20.0},

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from channel.links.endpoints import free_endpoint
+from tenbaud.flight.lifeline import VARIABLE
 from tests import warm
 from tests.tenbaud.ends import wait_for
 from tests.tenbaud.processes import run
@@ -60,6 +61,9 @@ def test_what_a_demo_starts_are_its_children_and_they_end_with_it(tmp_path: Path
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         wait_for(lambda: len(children.read_text().split()) == 3, lambda: "no two ends")
         ends = [int(one) for one in children.read_text().split()]
+        for one in ends:
+            variables = Path(f"/proc/{one}/environ").read_bytes()
+            assert VARIABLE.encode() not in variables, "an ordinary process has it"
         process.kill()
         wait_for(lambda: not any(map(is_alive, ends)), lambda: "ends are left behind")
 

@@ -45,6 +45,8 @@ REQUEST_BYTES_MAX = 1 << 20
 NAME_BYTES_MAX = 4096
 READ_AT_START = ("PYTHON", "LANG", "LC_", "OMP_", "OPENBLAS_")
 """Variables of these names count before anything is imported: a copy has those of its original."""
+ALIKE = {"PYTHONPATH": None, "PYTHONIOENCODING": "utf-8"}
+"""But not these: a copy looks where the first says, and its streams are in UTF-8."""
 
 
 class Popen(subprocess.Popen):  # type: ignore[type-arg]
@@ -89,8 +91,12 @@ def _is_same(folder: str, environment: Any) -> bool:
 
 
 def _at_start(environment: Any) -> dict[str, str]:
-    names = [name for name in environment if name.startswith(READ_AT_START) and name != "PYTHONPATH"]
-    return {name: environment[name] for name in names}
+    counting = [name for name in environment if name.startswith(READ_AT_START)]
+    return {name: environment[name] for name in counting if not _is_alike(name, environment[name])}
+
+
+def _is_alike(name: str, value: str) -> bool:
+    return name in ALIKE and ALIKE[name] in (None, value)
 
 
 class Server:

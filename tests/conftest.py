@@ -77,7 +77,7 @@ COLD = (
     "tests/tenbaud/test_not_flown.py",
     "tests/tenbaud/view/test_gate.py",
     "tests/tenbaud/view/test_beside.py",
-    "tests/network/",
+    "tests/network/test_pages.py",
     "tests/docs/",
 )
 """Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins

@@ -14,6 +14,7 @@ import pytest
 from channel.links.endpoints import free_endpoint
 from tenbaud.flight.lifeline import VARIABLE
 from tests import warm
+from tests.network.namespaces import Lab
 from tests.tenbaud.ends import wait_for
 from tests.tenbaud.processes import run
 
@@ -68,6 +69,20 @@ def test_what_a_demo_starts_are_its_children_and_they_end_with_it(tmp_path: Path
         wait_for(lambda: not any(map(is_alive, ends)), lambda: "ends are left behind")
 
 
+def test_a_copy_enters_a_network_namespace_as_the_command_before_it_says(tmp_path: Path) -> None:
+    arguments = ("receive", "--listen", free_endpoint(), "--out", "run")
+    with Lab() as lab:
+        machine = lab.machine("apart")
+        with subprocess.Popen([*machine.prefix, *TENBAUD, *arguments], cwd=tmp_path) as process:
+            wait_for((tmp_path / "run").is_dir, lambda: "no folder")
+            words = Path(f"/proc/{process.pid}/cmdline").read_text().rstrip("\0").split("\0")
+            there = Path(f"/proc/{process.pid}/ns/net").stat().st_ino
+            process.send_signal(signal.SIGINT)
+        assert words == [*TENBAUD, *arguments]
+        assert there == (warm.NAMESPACES / machine.name).stat().st_ino
+        assert there != Path("/proc/self/ns/net").stat().st_ino
+
+
 def is_alive(number: int) -> bool:
     try:
         return ") Z " not in Path(f"/proc/{number}/stat").read_text()
@@ -86,6 +101,7 @@ def test_what_counts_before_the_first_import_starts_an_ordinary_process(tmp_path
 END = """
 import atexit, sys, threading, time
 from tests import warm
+from tests.network.namespaces import Lab
 threading.Thread(target=lambda: (time.sleep(0.2), print("thread"))).start()
 atexit.register(print, "exit")
 try:

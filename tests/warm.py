@@ -2,9 +2,10 @@
 
 Most of a short flight is the start of its processes: each imports the same six hundred modules. Here a
 process is a copy (`fork`) of one that has imported them and has done nothing else: with streams,
-environment, folder and session of its own, and a child of the one that asked for it. What is said about
-starting, ending or finding processes is tested with ordinary ones, and so is what a shell starts; the
-commands of the documentation are copies of their own kind (`tests/docs/prepared.py`).
+environment, folder, network namespace and session of its own, and a child of the one that asked for it.
+What serves a page also finds the page's libraries imported. What is said about starting, ending or
+finding processes is tested with ordinary ones, and so is what a shell starts; the commands of the
+documentation are copies of their own kind (`tests/docs/prepared.py`).
 
 A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that.
 """
@@ -27,6 +28,7 @@ import threading
 import traceback
 import types
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -37,10 +39,16 @@ IMPORTED = (
     *("tenbaud.flight.screen", "channel.links.zenoh.link", "zenoh", "numpy"),
     *("scipy.linalg", "scipy.optimize"),
 )
+PAGE = ("nicegui", "uvicorn", "tenbaud.view.page", "tenbaud.view.server")
+"""Imported before the first copy that serves a page; most workers of a run make none."""
+SERVES_PAGE = ("view", "--view")
 STARTS_OTHERS = ("demo", "figures")
 CLONE = {"x86_64": 56, "aarch64": 220}.get(platform.machine()) if sys.platform == "linux" else None
 """The number of the system call that makes a copy."""
 CLONE_PARENT = 0x8000
+CLONE_NEWNET = 0x40000000
+IN_NAMESPACE = ["ip", "netns", "exec"]
+NAMESPACES = Path("/run/netns")
 REQUEST_BYTES_MAX = 1 << 20
 NAME_BYTES_MAX = 4096
 READ_AT_START = ("PYTHON", "LANG", "LC_", "OMP_", "OPENBLAS_")
@@ -62,12 +70,15 @@ class Popen(subprocess.Popen):  # type: ignore[type-arg]
         words = [os.fsdecode(one) for one in args] if plain and not isinstance(args, str) else []
         environment = dict(os.environ if env is None else env)
         folder = os.fsdecode(cwd or os.getcwd())
+        namespace = words[3] if words[:3] == IN_NAMESPACE else None
+        words = words[4:] if namespace else words
         copied = words[:3] == [sys.executable, "-m", "tenbaud"] and _is_same(folder, environment)
         request = {
             "arguments": words[3:],
             "folder": folder,
             "environment": environment,
             "own_session": own_session,
+            "namespace": namespace,
         }
         places = (pipes[0], pipes[3], pipes[5])
         streams = [own if own != -1 else number for number, own in enumerate(places)]
@@ -160,6 +171,14 @@ def load() -> None:
     gc.freeze()
 
 
+@cache
+def _load_page() -> None:
+    with suppress(ImportError):  # the command says what to install
+        for name in PAGE:
+            importlib.import_module(name)
+    gc.freeze()
+
+
 def main(number: int) -> None:
     """Import, and make copies until the other side has gone."""
     load()
@@ -173,11 +192,14 @@ def serve(connection: socket.socket) -> None:
         data, streams, _, _ = socket.recv_fds(connection, REQUEST_BYTES_MAX, 3)
         if not data:
             return
+        request = json.loads(data)
+        if set(SERVES_PAGE) & set(request["arguments"]):
+            _load_page()
         assert len(os.listdir("/proc/self/task")) == 1, "a copy has one thread alone"
         number = _copy()
         if number == 0:
             connection.close()
-            begin(json.loads(data), streams)
+            begin(request, streams)
         connection.send(str(max(number, 0)).encode())  # 0: there was no room for another process
         for stream in streams:
             os.close(stream)
@@ -201,6 +223,8 @@ def begin(request: dict[str, Any], streams: list[int]) -> NoReturn:
     try:
         if request.get("own_session"):
             os.setsid()
+        if request.get("namespace"):
+            _enter(request["namespace"])
         if request["arguments"][:1] and request["arguments"][0] in STARTS_OTHERS:
             keep_a_copy()
         for number, stream in enumerate(streams):
@@ -229,6 +253,14 @@ def begin(request: dict[str, Any], streams: list[int]) -> NoReturn:
         ended = error
     finally:
         _end(ended)
+
+
+def _enter(namespace: str) -> None:
+    """Go to a network namespace, as `ip netns exec` does; with one thread that is the whole process."""
+    with (NAMESPACES / namespace).open() as place:
+        if ctypes.CDLL(None, use_errno=True).setns(place.fileno(), CLONE_NEWNET):
+            number = ctypes.get_errno()
+            raise OSError(number, os.strerror(number), namespace)
 
 
 def _end(ended: BaseException | None) -> NoReturn:

@@ -25,7 +25,7 @@ PICTURES = {
 """Pictures, and what their parts turn about."""
 
 
-def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to_the_limit(
+def test_without_a_flight_it_says_so_and_then_shows_a_plant_of_any_outputs_with_names_and_units(
     chromium: Any, tmp_path: Path
 ) -> None:
     from channel.links.zenoh.telemetry import TelemetryPort
@@ -51,10 +51,11 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
         "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
     }  # fmt: skip
     TELEMETRY.validate_python(message)
-    port = TelemetryPort("transmitter", "lab", place)
     with served(tmp_path, "view", "--port", "0", "--connect", place) as one:
         page = chromium.new_page()
         page.goto(one.url)
+        check_without_a_flight(page)
+        port = TelemetryPort("transmitter", "lab", place)
         for _ in range(100):
             port.publish(json.dumps(message).encode())
             page.wait_for_timeout(100.0)
@@ -85,6 +86,13 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()
+
+
+def check_without_a_flight(page: Any) -> None:
+    """Check that a page before any flight says so, and steers nothing."""
+    page.get_by_text("No flight found. Start one").wait_for()
+    assert page.get_by_role("button", name="Corrupt the transmitter's codec").is_disabled()
+    state_is(page, "waiting")
 
 
 def check_pictures(

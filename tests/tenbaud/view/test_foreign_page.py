@@ -72,16 +72,21 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         yield one
 
 
-@pytest.fixture
-def own(chromium: Any, flight: Served) -> Iterator[Any]:
-    """The live page, opened as its user does, in a context that then has the cookie."""
-    context = chromium.new_context()
-    page = context.new_page()
-    page.goto(flight.url)
-    state_is(page, "lockstep")
+@pytest.fixture(scope="module")
+def tab(chromium: Any) -> Iterator[Any]:
+    page = chromium.new_context().new_page()
     yield page
-    assert page.locator("#f-rejoins").inner_text() == "0, 0"
-    context.close()
+    page.context.close()
+
+
+@pytest.fixture
+def own(tab: Any, flight: Served) -> Iterator[Any]:
+    """The live page, opened as its user does, in a context that then has the cookie."""
+    tab.context.clear_cookies()
+    tab.goto(flight.url)
+    state_is(tab, "lockstep")
+    yield tab
+    assert tab.locator("#f-rejoins").inner_text() == "0, 0"
 
 
 @contextmanager
@@ -186,6 +191,7 @@ def test_who_may_only_look_sees_the_flight_and_has_nothing_to_press(own: Any, fl
     page.get_by_text("view-only").wait_for()
     assert page.locator(".controls button, .controls input").count() == 0
     assert own.locator(".controls button").count() > 5
+    context.close()
     # Nor does the one overwrite the other's cookie, in one browser.
     second = own.context.new_page()
     second.goto(flight.look_url)
@@ -194,7 +200,6 @@ def test_who_may_only_look_sees_the_flight_and_has_nothing_to_press(own: Any, fl
     state_is(own, "lockstep")
     own.get_by_role("button", name="Corrupt the transmitter's codec").wait_for()
     second.close()
-    context.close()
 
 
 def test_when_the_page_is_opened_without_its_secret_then_it_says_what_to_do(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -42,18 +43,41 @@ def two_runs(runs: tuple[Run, Run], tmp_path_factory: pytest.TempPathFactory) ->
         yield one
 
 
-@pytest.fixture
-def open_page(chromium: Any) -> Iterator[Any]:
-    opened = []
+PHONE = {"viewport": {"width": 360, "height": 740}, "has_touch": True, "is_mobile": True}
+SCREEN = {"viewport": {"width": 1280, "height": 900}}
 
-    def opening(one: Served, **context: Any) -> Any:
-        page = chromium.new_context(
-            **{"viewport": {"width": 1280, "height": 900}, **context}
-        ).new_page()
+
+@pytest.fixture(scope="module")
+def tabs(chromium: Any) -> Iterator[Callable[[bool], Any]]:
+    """Return the tab of a screen, or of a phone: to load a page there takes less than in a new one."""
+
+    @cache
+    def tab(phone: bool) -> Any:
+        page = chromium.new_context(**(PHONE if phone else SCREEN)).new_page()
         page.faults, page.asked = [], []
         page.on("pageerror", lambda error: page.faults.append(str(error)))
         page.on("console", lambda line: page.faults.append(line.text) if line.type == "error" else None)
         page.on("request", lambda request: page.asked.append(request.url))
+        opened.append(page)
+        return page
+
+    opened: list[Any] = []
+    yield tab
+    for page in opened:
+        page.context.close()
+
+
+@pytest.fixture
+def open_page(tabs: Callable[[bool], Any]) -> Iterator[Any]:
+    opened = []
+
+    def opening(one: Served, *, phone: bool = False, scheme: str = "light") -> Any:
+        page = tabs(phone)
+        page.emulate_media(color_scheme=scheme)
+        page.context.clear_cookies()
+        page.mouse.move(0.0, 0.0)
+        page.faults.clear()
+        page.asked.clear()
         page.goto(one.url)
         page.locator("#value-0").wait_for()
         opened.append(page)
@@ -62,7 +86,7 @@ def open_page(chromium: Any) -> Iterator[Any]:
     yield opening
     for page in opened:
         assert page.faults == []
-        page.context.close()
+        page.goto("about:blank")
 
 
 def wait(page: Any, expression: str) -> None:
@@ -243,8 +267,7 @@ def test_flights_of_unlike_inputs_have_bars_and_pictures_of_their_own(
 def test_a_phone_shows_two_flights_without_scrolling_sideways(
     open_page: Any, two_runs: Served, scheme: str
 ) -> None:
-    phone = {"viewport": {"width": 360, "height": 740}, "has_touch": True, "is_mobile": True}
-    page = open_page(two_runs, **phone, color_scheme=scheme)
+    page = open_page(two_runs, phone=True, scheme=scheme)
     page.locator("#play").tap()
     wait(page, "() => parseFloat(document.getElementById('f-time').textContent) > 0.3")
     assert page.evaluate("document.documentElement.scrollWidth") <= 360

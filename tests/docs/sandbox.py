@@ -2,8 +2,8 @@
 
 The commands stand in the pages as people type them. What makes them safe to run in a test is here:
 the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
-that `make` would build is there already, and the home folder is an empty one; what was compiled for
-studies is shared. pytest only collects in it, and two files of tests alone: the tests that type in
+that `make` would build is there already, and so is what it has downloaded; the home folder is an empty
+one; what was compiled for studies is shared. pytest only collects in it, and two files of tests alone: the tests that type in
 `make test` must not run themselves.
 """
 
@@ -87,6 +87,7 @@ class Sandbox:
         (programs / "activate").write_text(f'PATH="{self._path}:$PATH"\n')
         for stamp in (".installed", ".installed-dev"):  # in this order: the second needs the first
             (self.top / ".venv" / stamp).touch()
+        self._show_downloads()
         return self
 
     def __exit__(self, *problem: object) -> None:
@@ -187,6 +188,19 @@ class Sandbox:
         unread = {name for name in unread if not f"{folder}/{name}".endswith(COLLECTED)}
         at_top = LEFT_OUT_AT_TOP & set(names) if Path(folder) == TOP else set()
         return shutil.ignore_patterns(*LEFT_OUT)(folder, names) | at_top | unread
+
+    def _show_downloads(self) -> None:
+        """Let `make` find here what it has downloaded beside the tests, if it has."""
+        kept, here = TOP / ".cache", self.top / ".cache"
+        here.mkdir()
+        if (kept / "aarch64").is_dir():
+            (here / "aarch64").symlink_to(kept / "aarch64")
+        pyodide, lock = kept / "pyodide", TOP / "docs" / "browser" / "package-lock.json"
+        stamp = pyodide / ".installed"
+        if stamp.is_file() and stamp.read_bytes() == lock.read_bytes():
+            (here / "pyodide").mkdir()
+            shutil.copy(stamp, here / "pyodide")
+            (here / "pyodide" / "node_modules").symlink_to(pyodide / "node_modules")
 
     def _free_port(self, match: re.Match[str]) -> str:
         port = match[0]

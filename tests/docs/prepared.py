@@ -1,10 +1,10 @@
 """Commands of a page as copies of a process that has imported what they need.
 
 A page types in a dozen commands, and each would spend most of its time on imports. Here one process has
-imported the libraries; a copy of it (`fork`) imports the project as a page's folder has it, and each
-command of that page is a copy of this copy. `tenbaud` and `python -c` in that folder are small programs
-that ask for a copy, pass it their streams, forward signals, and end as it ended. The long tests and
-what `make` starts are ordinary processes.
+imported the libraries and the project, from a folder of which each page has a copy; a copy of the
+process (`fork`) belongs to a page, and each command of that page is a copy of this copy. `tenbaud` and
+`python -c` in the page's folder are small programs that ask for a copy, pass it their streams, forward
+signals, and end as it ended. The long tests and what `make` starts are ordinary processes.
 """
 
 from __future__ import annotations
@@ -27,11 +27,16 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from tests import warm
+from tests.docs.repository import Ports, copy_repository
 
 LIBRARIES = (
     *("numpy", "scipy.linalg", "scipy.optimize", "scipy.signal", "control", "matplotlib.pyplot"),
-    *("numba", "pydantic", "typer", "rich.table", "mcap.reader", "orjson", "zenoh"),
+    *("numba", "pydantic", "typer", "rich.table", "mcap.reader", "orjson", "zenoh", "pandas"),
 )
+AS_TYPED = {"COLUMNS": "200", "NO_COLOR": "1"}
+"""What a page's commands find in their environment, and some libraries read when they are imported."""
+ONE_THREAD = {"JE_ARROW_MALLOC_CONF": "background_thread:false"}
+"""What keeps a library of pandas from starting a thread when it is imported."""
 PR_SET_PDEATHSIG = 1
 PROGRAM = """#!{python} -IS
 import json, os, signal, socket, sys
@@ -61,15 +66,16 @@ os._exit(code)
 
 
 def serve_page(folder: Path, environment: dict[str, str], programs: Path) -> socket.socket:
-    """Import the project as it is in a folder, and write `tenbaud` and `python` that copy the result.
+    """Begin what makes the copies in a folder, and write `tenbaud` and `python` that ask for them.
 
     It ends when the connection is closed that this returns.
     """
-    server = tempfile.mktemp(prefix="page-", dir=_libraries().parent)  # names of sockets are short
+    imported, _ = _imported()
+    server = tempfile.mktemp(prefix="page-", dir=imported.parent)  # names of sockets are short
     listener = _listen(server)
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, warm.REQUEST_BYTES_MAX)
-    connection.connect(str(_libraries()))
+    connection.connect(str(imported))
     request = {"page": True, "folder": str(folder), "environment": environment}
     with open(os.devnull, "rb") as nothing, listener:
         streams = [nothing.fileno(), 2, listener.fileno()]
@@ -88,17 +94,30 @@ def serve_page(folder: Path, environment: dict[str, str], programs: Path) -> soc
     return connection
 
 
+def copy_imported(folder: Path) -> Ports:
+    """Copy the repository as it is imported into a new folder; return the ports exchanged in it."""
+    listens, ports = _imported()
+    subprocess.run(["cp", "-a", listens.parent / "repository", folder], check=True)
+    return ports
+
+
 @cache
-def _libraries() -> Path:
-    """Start what has imported the libraries; return where it listens."""
+def _imported() -> tuple[Path, Ports]:
+    """Start what has imported everything; return where it listens, and its ports."""
     folder = tempfile.TemporaryDirectory(prefix="tenbaud-")
-    place = Path(folder.name) / "server"
+    repository, place, ports = Path(folder.name) / "repository", Path(folder.name) / "server", Ports()
+    copy_repository(repository, ports, short=True)
     code = f"import sys; sys.path.insert(0, {str(warm.TOP)!r}); from tests.docs import prepared; "
-    command = [sys.executable, "-c", f"{code}prepared.main({str(place)!r})", "-" * warm.NAME_BYTES_MAX]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    code += f"prepared.main({str(place)!r}, {str(repository)!r})"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "-" * warm.NAME_BYTES_MAX],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=os.environ | AS_TYPED | ONE_THREAD,
+    )
     assert process.stdin is not None
     assert process.stdout is not None
-    assert process.stdout.readline(), "what imports the libraries has ended"
+    assert process.stdout.readline(), "what imports everything has ended"
 
     def close() -> None:
         process.stdin.close()  # type: ignore[union-attr]
@@ -106,13 +125,15 @@ def _libraries() -> Path:
         folder.cleanup()
 
     atexit.register(close)
-    return place
+    return place, ports
 
 
-def main(place: str) -> None:
-    """Import the libraries and make copies until standard input ends."""
+def main(place: str, repository: str) -> None:
+    """Import everything and make copies until standard input ends."""
+    sys.path[0] = repository
     for name in LIBRARIES:
         importlib.import_module(name)
+    warm.load()
     listener = _listen(place)
     print("ready", flush=True)
     _serve(listener, sys.stdin.fileno())
@@ -191,6 +212,5 @@ def _begin(request: dict[str, Any], streams: list[int]) -> NoReturn:
     os.environ.clear()
     os.environ.update(request["environment"])
     sys.path[0] = str(warm.TOP)
-    warm.load()
     _serve(listener)
     os._exit(0)

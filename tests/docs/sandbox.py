@@ -1,17 +1,15 @@
 """A place to type a page's commands into: a copy of the repository, with its commands on the path.
 
 The commands stand in the pages as people type them. What makes them safe to run in a test is here:
-the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
-that `make` would build is there already, and the home folder is an empty one; what was compiled for
+every loopback port is exchanged for a free one, the environment that `make` would build is there
+already, and so is what it has downloaded; the home folder is an empty one; what was compiled for
 studies is shared. pytest only collects in it, and two files of tests alone: the tests that type in
 `make test` must not run themselves.
 """
 
 from __future__ import annotations
 
-import fnmatch
 import os
-import re
 import shlex
 import shutil
 import signal
@@ -25,18 +23,11 @@ from pathlib import Path
 from tests import warm
 from tests.docs import prepared
 from tests.docs.blocks import Block
+from tests.docs.repository import COLLECTED, Ports, copy_repository
 from tests.rules.sources import TOP
 
-LEFT_OUT = (".git", ".venv", "*.egg-info", ".cache", ".*_cache", ".hypothesis")
-LEFT_OUT_AT_TOP = {"runs", "site", "dist", "build"}
-"""Left out of the top folder only: `tenbaud/build` is a package."""
-COLLECTED = ("tests/transmitter/test_guard.py", "tests/transmitter/test_overload.py")
-"""Tests of both halves of `make test`."""
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
-LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
-VIEW_PORT = 8710
-EVALUATIONS = ("EVALUATIONS_MAX = 400", "EVALUATIONS_MAX = 30")
 BLOCK_TIMEOUT_S = 150.0
 STARTED_WITHIN_S = 60.0
 ENDED_WITHIN_S = 60.0
@@ -57,7 +48,7 @@ class Sandbox:
     timeout_s: float = BLOCK_TIMEOUT_S
     copies: bool = False
     """whether commands may begin with everything imported (`tests/docs/prepared.py`)"""
-    ports: dict[str, str] = field(default_factory=dict)
+    ports: Ports = field(default_factory=Ports)
     _path: str = ""
     _settled: bool = True
     _prepared: socket.socket | None = None
@@ -65,13 +56,12 @@ class Sandbox:
 
     def __enter__(self) -> Sandbox:
         self.top = self.folder / "tenbaud"
-        shutil.copytree(TOP, self.top, ignore=self._left_out, symlinks=True)
         (self.folder / "home").mkdir()
-        self._exchange_default_port()
-        for name in ("demo", "view"):  # the live page's port: any free one
-            self._exchange(f"tenbaud/cli/{name}.py", f" = {VIEW_PORT}", " = 0")
-        if self.copies:  # of flights to fit a coder's constants: few, as in the tests of that
-            self._exchange("tenbaud/studies/quick.py", *EVALUATIONS)
+        starts_copies = self.copies and warm.CLONE is not None
+        if starts_copies:
+            self.ports.update(prepared.copy_imported(self.top))
+        else:
+            copy_repository(self.top, self.ports, self.copies)
         programs = self.top / ".venv" / "bin"
         programs.mkdir(parents=True)
         for name, how in COMMANDS.items():
@@ -79,7 +69,7 @@ class Sandbox:
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {how} "$@"\n')
             program.chmod(0o755)
         self._path = str(programs)
-        if self.copies and warm.CLONE is not None:
+        if starts_copies:
             typed = self.folder / "typed"  # `make` starts the ordinary ones
             typed.mkdir()
             self._prepared = prepared.serve_page(self.top, self._environment(), typed)
@@ -87,6 +77,7 @@ class Sandbox:
         (programs / "activate").write_text(f'PATH="{self._path}:$PATH"\n')
         for stamp in (".installed", ".installed-dev"):  # in this order: the second needs the first
             (self.top / ".venv" / stamp).touch()
+        self._show_downloads()
         return self
 
     def __exit__(self, *problem: object) -> None:
@@ -99,7 +90,7 @@ class Sandbox:
 
     def run(self, block: Block) -> str:
         """Type a block in; return what it says. BlockFailed if it is not what the page says."""
-        script = LOOPBACK_PORT.sub(self._free_port, block.script)
+        script = self.ports.exchange(block.script)
         if block.language == "python":
             script = f"exec python -c {shlex.quote(script)}"
         if block.background:
@@ -152,9 +143,8 @@ class Sandbox:
             "HOME": str(self.folder / "home"),
             "MPLCONFIGDIR": matplotlib.get_configdir(),
             "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")),
-            "COLUMNS": "200",
+            **prepared.AS_TYPED,
             "PYTEST_ADDOPTS": " ".join(["--collect-only", *COLLECTED]),
-            "NO_COLOR": "1",
         }
 
     def _popen(self, script: str, output: object) -> subprocess.Popen[str]:
@@ -181,35 +171,18 @@ class Sandbox:
             if not found:
                 raise BlockFailed(f"{block.name} does not say, or not there: {line.strip()}\n\n{said}")
 
-    def _left_out(self, folder: str, names: list[str]) -> set[str]:
-        """Return which entries of a folder are not copied."""
-        unread = set(fnmatch.filter(names, "test_*.py")) if self.copies else set()
-        unread = {name for name in unread if not f"{folder}/{name}".endswith(COLLECTED)}
-        at_top = LEFT_OUT_AT_TOP & set(names) if Path(folder) == TOP else set()
-        return shutil.ignore_patterns(*LEFT_OUT)(folder, names) | at_top | unread
-
-    def _free_port(self, match: re.Match[str]) -> str:
-        port = match[0]
-        if port != "0" and port not in self.ports:
-            from channel.links.endpoints import free_endpoint
-
-            self.ports[port] = free_endpoint().rpartition(":")[2]
-        return self.ports.get(port, port)
-
-    def _exchange_default_port(self) -> None:
-        from channel.links.endpoints import DEFAULT_PORT
-
-        path = self.top / "channel" / "links" / "endpoints.py"
-        text, setting = path.read_text(), f"DEFAULT_PORT = {DEFAULT_PORT}"
-        assert text.count(setting) == 1
-        text = text.replace(setting, re.sub(r"\d+", self._free_port, setting))
-        path.write_text(LOOPBACK_PORT.sub(self._free_port, text))
-
-    def _exchange(self, file: str, text: str, other: str) -> None:
-        path = self.top / file
-        whole = path.read_text()
-        assert text in whole
-        path.write_text(whole.replace(text, other))
+    def _show_downloads(self) -> None:
+        """Let `make` find here what it has downloaded beside the tests, if it has."""
+        kept, here = TOP / ".cache", self.top / ".cache"
+        here.mkdir()
+        if (kept / "aarch64").is_dir():
+            (here / "aarch64").symlink_to(kept / "aarch64")
+        pyodide, lock = kept / "pyodide", TOP / "docs" / "browser" / "package-lock.json"
+        stamp = pyodide / ".installed"
+        if stamp.is_file() and stamp.read_bytes() == lock.read_bytes():
+            (here / "pyodide").mkdir()
+            shutil.copy(stamp, here / "pyodide")
+            (here / "pyodide" / "node_modules").symlink_to(pyodide / "node_modules")
 
 
 def _ends(process: subprocess.Popen[str], within_s: float) -> bool:
@@ -222,4 +195,4 @@ def _ends(process: subprocess.Popen[str], within_s: float) -> bool:
 
 def _squeezed(text: str) -> str:
     """Return the text with every stretch of space and table lines as one space."""
-    return " ".join(re.sub(r"[│┃|]", " ", text).split())
+    return " ".join(text.translate(dict.fromkeys(map(ord, "│┃|"), " ")).split())

@@ -66,7 +66,7 @@ def test_when_the_simulated_rig_is_identified_then_both_ends_can_fly_with_the_re
 ) -> None:
     out = tmp_path / "out"
     counts = "transmitter.encoders.counts_per_turn=1024"
-    result = run("--set", counts, "--json", "--no-fly", "--out", str(out))
+    result = run("--set", counts, "--json", "--no-fly", "--figure", "--out", str(out))
     for index in (0, 1):
         estimates = found(result, index)
         for name, true in TRUE.items():

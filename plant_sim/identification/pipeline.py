@@ -21,7 +21,8 @@ from plant_sim.identification.faults import dominant_rad_s, require_motion
 from plant_sim.identification.filters import Array
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress, require_bandwidth
-from plant_sim.identification.simulation import Segments, SimulationFit
+from plant_sim.identification.segments import SAMPLES_MAX, SEGMENT_S, Segments, cut, every_other
+from plant_sim.identification.simulation import SimulationFit
 from plant_sim.identification.structures import (
     LinearStructure,
     Parameter,
@@ -30,6 +31,7 @@ from plant_sim.identification.structures import (
     gains_of,
     names_of,
 )
+from plant_sim.identification.trajectories import Candidate, simulation_residuals
 
 LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.5)
 UNCERTAINTY_MAX = 0.25
@@ -170,17 +172,20 @@ def _rough_lag(
     """Return the lag with the smallest simulation error, of a few."""
     if options.lag_s is not None:
         return options.lag_s
-    few = record.part(0.0, simulation.SAMPLES_MAX * record.step_s)
-    errors = {}
+    few = record.part(0.0, SAMPLES_MAX * record.step_s)
+    candidates = []
     for lag_s in LAGS_S:
         values = regress(few, structure, replace(filters, lag_s=lag_s), blocks=COARSE).values
-        errors[lag_s] = _error(structure, values, lag_s, segments)
-    return min(errors, key=errors.__getitem__)
+        candidates.append(Candidate(values, lag_s, segments))
+    errors = _errors(structure, candidates)
+    return candidates[errors.index(min(errors))].lag_s
 
 
-def _error(structure: Structure, values: dict[str, float], lag_s: float, segments: Segments) -> float:
-    errors = simulation.simulation_residuals(structure, values, lag_s, segments) / segments.scale
-    return float(np.mean(errors**2))
+def _errors(structure: Structure, candidates: list[Candidate]) -> list[float]:
+    """Return the mean square of each candidate's simulation error, in usual motions."""
+    residuals = simulation_residuals(structure, candidates)
+    scales = [one.segments.scale for one in candidates]
+    return [float(np.mean((one / scale) ** 2)) for one, scale in zip(residuals, scales, strict=True)]
 
 
 def _simulated(
@@ -189,10 +194,10 @@ def _simulated(
     """Return the simulation-error fit with its lag, over segments that the model can follow."""
     best: tuple[Segments, SimulationFit] | None = None
     for shorter in SHORTER:
-        length_s = simulation.SEGMENT_S / filters.bandwidth_rad_s / shorter
+        length_s = SEGMENT_S / filters.bandwidth_rad_s / shorter
         if best is not None and length_s < 16.0 * record.step_s:
             break
-        segments = simulation.cut(record, structure, length_s, rests=filters.rests)
+        segments = cut(record, structure, length_s, rests=filters.rests)
         lag_s = _rough_lag(record, structure, filters, segments, options)
         start = regress(record, structure, replace(filters, lag_s=lag_s), blocks=COARSE)
         free = options.lag_s is None
@@ -238,11 +243,12 @@ def _predicts_better(
     """Return whether a fit of half the segments beats the regression over the other half."""
     if not np.all(np.isfinite(np.diag(regression.covariance))):
         return True
-    used, held = (simulation.every_other(segments, first) for first in (0, 1))
+    used, held = (every_other(segments, first) for first in (0, 1))
     lag_s = regression.filters.lag_s
     fitted = simulation.fit(used, structure, check.values, lag_s)
-    errors = [_error(structure, one.values, lag_s, held) for one in (fitted, regression)]
-    return errors[0] < errors[1]
+    candidates = [Candidate(one.values, lag_s, held) for one in (fitted, regression)]
+    ours, theirs = _errors(structure, candidates)
+    return ours < theirs
 
 
 def disagreements(regression: Regression, check: SimulationFit) -> dict[str, str]:

@@ -19,6 +19,7 @@ import numpy as np
 from plant_sim.identification import simulation
 from plant_sim.identification.pipeline import Options, identify
 from plant_sim.identification.regression import regress
+from plant_sim.identification.segments import cut
 from plant_sim.identification.structures import PitchStructure
 from reproduction.paper.flights import Job, Overrides
 from reproduction.paper.identified import MOTOR_LAG_S
@@ -65,7 +66,7 @@ def identify_first_half(data: Path) -> FirstHalf:
     options = Options(MOTOR_LAG_S, BANDWIDTH_RAD_S)
     whole = identify(record, PitchStructure(), options)
     structure = PitchStructure(damped=False)
-    segments = simulation.cut(record, structure, SEGMENT_S)
+    segments = cut(record, structure, SEGMENT_S)
     start = regress(record, structure, whole.regression.filters)
     fitted = simulation.fit(segments, structure, start.values, MOTOR_LAG_S)
     found = structure.parameters(fitted.values, fitted.covariance)

@@ -9,13 +9,16 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from plant_sim.identification import pipeline, simulation
+from plant_sim.identification.differences import Differences
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.faults import require_units
 from plant_sim.identification.filters import Array
 from plant_sim.identification.pipeline import Identification, Options
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import regress
+from plant_sim.identification.segments import SEGMENT_S, cut
 from plant_sim.identification.structures import PitchStructure, names_of
+from plant_sim.identification.trajectories import Candidate, simulation_residuals
 from tenbaud.identification.structure import Chosen, choose
 from tenbaud.log.angles import turn_of, unwrapped
 
@@ -136,7 +139,7 @@ def _explained(record: Record, found: Identification) -> float:
     """Return the share of the motion that a fit of the same structure explains, theta_0 free."""
     structure = PitchStructure(None, getattr(found.structure, "volts_max", float("inf")))
     filters = replace(found.regression.filters, rests=False, gain=None)
-    segments = simulation.cut(record, structure, simulation.SEGMENT_S / filters.bandwidth_rad_s)
+    segments = cut(record, structure, SEGMENT_S / filters.bandwidth_rad_s)
     start = regress(record, structure, filters, blocks=pipeline.COARSE).values
     try:
         return simulation.fit(segments, structure, start, filters.lag_s).explained
@@ -159,9 +162,9 @@ def _without_drift(
 
     # A drift and a lag stand in for each other: both are fitted with the parameters.
     free = PitchStructure(None, structure.volts_max)
-    length_s = simulation.SEGMENT_S / found.regression.filters.bandwidth_rad_s
-    segments = simulation.cut(record, free, length_s)
-    clock = simulation.cut(replace(record, outputs=times[:, None]), free, length_s).outputs
+    length_s = SEGMENT_S / found.regression.filters.bandwidth_rad_s
+    segments = cut(record, free, length_s)
+    clock = cut(replace(record, outputs=times[:, None]), free, length_s).outputs
     guess = float(np.polyfit(times, record.outputs[:, 0], 1)[0])
     lag_s, names = wanted.options.lag_s, names_of(free)
     filters = replace(found.regression.filters, lag_s=0.05 if lag_s is None else lag_s)
@@ -169,14 +172,18 @@ def _without_drift(
     def without(rate: float) -> Record:
         return replace(record, outputs=record.outputs - rate * times[:, None])
 
-    def residuals(values: Array) -> Array:
+    def candidate(values: Array) -> Candidate:
         *found, lag, rate = values.tolist()
         straight = replace(segments, outputs=segments.outputs - rate * clock)
         named, lag = dict(zip(names, found, strict=True)), abs(lag) if lag_s is None else lag_s
-        return simulation.simulation_residuals(free, named, lag, straight).ravel()
+        return Candidate(named, lag, straight)
+
+    def residuals_of(sets: list[Array]) -> list[Array]:
+        return [one.ravel() for one in simulation_residuals(free, [candidate(one) for one in sets])]
 
     start = regress(without(guess), free, filters, blocks=pipeline.COARSE).values
-    rate = float(least_squares(residuals, [*start.values(), filters.lag_s, guess], max_nfev=20).x[-1])
+    residuals, first = Differences(residuals_of), [*start.values(), filters.lag_s, guess]
+    rate = float(least_squares(residuals, first, residuals.jacobian, max_nfev=20).x[-1])
     straight = without(rate)
     again = pipeline.identify(straight, structure, wanted.options)
     if again.check is None or again.check.explained < DRIFT_EXPLAINED:

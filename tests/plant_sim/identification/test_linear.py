@@ -19,6 +19,7 @@ from plant_sim.identification.filters import Array, SignalFilter, low_pass
 from plant_sim.identification.pipeline import Identification, Options, identify
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.segments import cut
 from plant_sim.identification.structures import LinearStructure, parse_linear
 
 H = 0.01
@@ -178,8 +179,8 @@ def test_when_no_second_method_confirms_the_estimates_then_no_model_is_supported
 def test_when_a_record_begins_under_a_steady_input_then_its_lag_remembers_that() -> None:
     record = Record(H, np.zeros((STEPS, 1)), np.full((STEPS, 1), 5.0))
     structure = parse_linear("first-order", ("y",), ("u",))
-    assert np.all(simulation.cut(record, structure, 5.0).before == 5.0)
-    assert np.all(simulation.cut(record, structure, 5.0, rests=True).before[:, 0] == 0.0)
+    assert np.all(cut(record, structure, 5.0).before == 5.0)
+    assert np.all(cut(record, structure, 5.0, rests=True).before[:, 0] == 0.0)
 
 
 def test_when_a_level_without_a_unit_moves_in_steps_of_1_then_it_is_not_taken_for_degrees() -> None:

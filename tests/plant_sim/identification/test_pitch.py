@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_sim.identification import simulation
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.filters import Array
@@ -16,7 +15,9 @@ from plant_sim.identification.pipeline import OF_A_LOG, Options, identify
 from plant_sim.identification.pitch import quiescent_angle
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.segments import cut
 from plant_sim.identification.structures import PitchStructure
+from plant_sim.identification.trajectories import Candidate, simulation_residuals
 from tests.plant_sim.identification.experiments import (
     EXCITATION_A,
     EXCITATION_B,
@@ -224,9 +225,9 @@ def test_when_front_and_rear_are_exchanged_then_the_negative_gain_is_pointed_out
 def test_when_initial_states_are_wrong_then_the_residuals_do_not_have_them() -> None:
     record = experiment(EXCITATION_A, 30.0)
     structure = PitchStructure(TRUE.equilibrium_rad)
-    segments = simulation.cut(record, structure, 2.0)
+    segments = cut(record, structure, 2.0)
     true = dict(zip(NAMES, (0.1, 0.5, 0.35), strict=True))
-    left = simulation.simulation_residuals(structure, true, TRUE.motor_lag_s, segments)
+    (left,) = simulation_residuals(structure, [Candidate(true, TRUE.motor_lag_s, segments)])
     assert np.sqrt(np.mean(left**2)) < math.tau / 1024 / 2.0
 
 

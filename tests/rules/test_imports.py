@@ -39,6 +39,9 @@ COMMANDS_OF_A_CHECKOUT = ("tenbaud/cli/checkout.py",)
 WITHOUT_ARRAYS = ("channel/*", "receiver/*")
 """What must agree to the last bit, or run every tick, does without numpy and scipy."""
 
+HEAVY = ("control", "matio", "matplotlib", "pandas")
+"""Tests import them inside functions: each worker imports what stands at the top of any file."""
+
 ARRAYS = ("channel/flight_log.py",)
 """A recorded flight is data from before the flight."""
 
@@ -105,6 +108,16 @@ def findings_in(source: str, name: str) -> list[str]:
 def test_every_import_of_the_packages_keeps_the_rules() -> None:
     texts = files_below(*PACKAGES, *OUTSIDE)
     found = [line for name, source in texts for line in findings_in(source, name)]
+    assert not found, report(found)
+
+
+def test_what_only_some_tests_need_is_not_imported_to_collect_all() -> None:
+    found = [
+        f"{name}:{line}: imports {module} at the top"
+        for name, source in files_below("tests")
+        for line, module, at_module_level in imports_of(source, name)
+        if at_module_level and module.split(".")[0] in HEAVY
+    ]
     assert not found, report(found)
 
 

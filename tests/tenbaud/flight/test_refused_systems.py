@@ -13,10 +13,11 @@ from tenbaud.errors import ConfigError
 from tests.tenbaud.flight.systems import NAMED, A, B, C, flown, pendulum
 
 CASES = 37
+Case = tuple[Any, dict[str, Any], str]
+"""A plant, what is given beside it, and the words of the error."""
 
 
-def refused() -> list[tuple[Any, dict[str, Any], str]]:
-    """Return plants, what is given beside them, and the words of the error."""
+def refused_plants() -> list[Case]:
     import control
 
     return [
@@ -68,6 +69,13 @@ def refused() -> list[tuple[Any, dict[str, Any], str]]:
         ),
         (pendulum(), {"operating_point": ([0.5], [0.0])}, r"states \[0\.5\]; 2 finite numbers"),
         (pendulum(), {"operating_point": 3.0}, "must be a pair"),
+    ]
+
+
+def refused_beside_plants() -> list[Case]:
+    import control
+
+    return [
         (control.ss(A, B, C, 0), {"operating_point": ([0, 0], [0])}, "this one has matrices"),
         (control.ss(A, B, C, 0), {"controller": [[1.0, 2.0, 3.0]]}, "1 row.* of 3 .* a row needs 2"),
         (
@@ -135,7 +143,7 @@ def refused() -> list[tuple[Any, dict[str, Any], str]]:
 def test_when_a_plant_cannot_be_flown_then_the_error_names_signal_and_number(
     number: int, tmp_path: Path
 ) -> None:
-    cases = refused()
+    cases = [*refused_plants(), *refused_beside_plants()]
     assert len(cases) == CASES
     system, given, text = cases[number]
     with pytest.raises(ConfigError, match=text):

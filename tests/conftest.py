@@ -69,7 +69,7 @@ COMPILED_BEFORE = "[docs/howto/your-log.md]"
 their machine code; nothing makes it wait for them."""
 
 PAGES = "tests/docs/test_commands.py::test_when_a_page_is_typed_in_then"
-"""On two workers, each with one process that has imported the libraries (`tests/docs/prepared.py`)."""
+"""On two workers, each with one process that has imported everything (`tests/docs/prepared.py`)."""
 
 COLD = (
     "tests/tenbaud/endings/",

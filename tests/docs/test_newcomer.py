@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import pytest
 
 from tenbaud.recording.reader import Recording
 from tests.docs.blocks import Block, blocks_of
+from tests.docs.repository import Ports, copy_repository
 from tests.docs.sandbox import Sandbox
 from tests.rules.sources import TOP
 
@@ -23,6 +26,7 @@ README = (TOP / "README.md").read_text(encoding="utf-8")
 BLOCKS = [block for block in blocks_of("README.md") if block.runs]
 FIRST_SCREEN_LINES = 30
 GIF_BYTES_MAX = 1_000_000
+FOR_DEVELOPMENT = {"pytest", "mypy", "ruff", "numba", "nicegui", "mkdocs", "control", "pyarrow"}
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +77,28 @@ def test_when_make_demo_is_typed_then_a_flight_and_its_figure_are_there(
     assert summary_of(min(flights))["exit_code"] == 0
     assert (min(flights) / "flight.png").read_bytes()[:4] == b"\x89PNG"
     assert "tests collected" in said["make demo"]
+
+
+@pytest.mark.soak
+def test_when_make_demo_is_typed_in_a_bare_copy_then_it_installs_what_flying_needs_and_no_more(
+    tmp_path: Path,
+) -> None:
+    top = tmp_path / "tenbaud"
+    copy_repository(top, Ports(), short=False)
+    left_out = ("PYTHONPATH", "VIRTUAL_ENV", "PYTEST_ADDOPTS", "TENBAUD_FIGURE")
+    environment = {name: value for name, value in os.environ.items() if name not in left_out}
+    command = ["make", "demo"]
+    done = subprocess.run(
+        command, cwd=top, env=environment, capture_output=True, text=True, timeout=900.0, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    (figure,) = top.glob("runs/*/flight.png")
+    assert summary_of(figure.parent)["digest_checks"] == 1000
+    installed = {
+        path.name.partition("-")[0] for path in top.glob(".venv/lib/*/site-packages/*.dist-info")
+    }
+    assert {"numpy", "tenbaud"} <= installed
+    assert not FOR_DEVELOPMENT & installed
 
 
 def test_when_the_first_flight_is_flown_then_it_is_as_good_as_the_readme_says(

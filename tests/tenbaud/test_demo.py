@@ -95,6 +95,15 @@ def test_there_is_no_usual_loop_for_other_plants_and_for_itself(preset: str) -> 
     assert usual_flight(agree(load_config(preset), "virtual")) is None
 
 
+def test_when_the_usual_loop_is_flown_by_two_processes_then_its_states_are_those_of_one(
+    tmp_path: Path,
+) -> None:
+    for name, how in (("two", []), ("one", ["--link", "memory"])):
+        flown = ["--preset", "usual-1000baud", "--mismatch", "10%", "--duration", "1", "--out", name]
+        assert run("demo", "--json", *flown, *how, cwd=tmp_path).summary["digest_checks"] == 100
+    assert compare_runs(tmp_path / "two", tmp_path / "one").verdict is Verdict.EQUAL
+
+
 @pytest.mark.skipif(not REAL_FLIGHT.is_file(), reason="the recorded flights are not beside the tree")
 def test_when_a_real_flight_is_replayed_then_its_pitch_is_known_remotely(tmp_path: Path) -> None:
     replayed = ("--rig", f"replay:{REAL_FLIGHT}")

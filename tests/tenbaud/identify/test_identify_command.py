@@ -338,14 +338,12 @@ def test_when_two_axes_are_identified_then_the_whole_coupled_model_is_written(tm
     )
     out = tmp_path / "out"
     columns = "out:pitch=pitch,out:yaw=yaw,in:u1=u1,in:u2=u2,time=time"
-    result = run(
-        *(str(log), "--columns", columns, "--unit", "rad", "--json", "--no-fly", "--figure"),
-        *("--out", str(out)),
-    )
-    assert len(list(out.glob("figure-*"))) == 4
+    log_and_out = (str(log), "--unit", "rad", "--figure", "--out", str(out))
+    result = run(*log_and_out, "--columns", columns, "--json", "--no-fly")
     estimates = found(result)
     assert estimates["pitch''/pitch"] == pytest.approx(-1.74, rel=0.05)
     assert estimates["yaw''/u2"] == pytest.approx(0.25, rel=0.05)
+    assert len(list(out.glob("figure-*"))) == 4
     model = load_config(None, out / "identified.toml").model.model_dump()
     assert np.array(model["A"])[1, :4] == pytest.approx([-1.74, -0.33, 0.3, 0.1], rel=0.05)
     assert model["F"]

@@ -81,7 +81,9 @@ def test_when_a_run_is_identified_then_its_own_plant_is_found(tmp_path: Path) ->
     flown = tmp_path / "flown"
     arguments = ["demo", "--link", "memory", "--mismatch", "0.1", "--duration", "50", "--json"]
     assert CliRunner().invoke(app, [*arguments, "--out", str(flown)]).exit_code == 0
-    estimates = found(run(str(flown), "--json", "--no-fly", "--out", str(tmp_path / "out")))
+    out = tmp_path / "out"
+    estimates = found(run(str(flown), "--json", "--no-fly", "--no-figure", "--out", str(out)))
+    assert not list(out.glob("figure-*"))
     for name, true in TRUE.items():
         assert estimates[name] == pytest.approx(1.1 * true, rel=0.03)
 
@@ -337,8 +339,10 @@ def test_when_two_axes_are_identified_then_the_whole_coupled_model_is_written(tm
     out = tmp_path / "out"
     columns = "out:pitch=pitch,out:yaw=yaw,in:u1=u1,in:u2=u2,time=time"
     result = run(
-        str(log), "--columns", columns, "--unit", "rad", "--json", "--no-fly", "--out", str(out)
+        *(str(log), "--columns", columns, "--unit", "rad", "--json", "--no-fly", "--figure"),
+        *("--out", str(out)),
     )
+    assert len(list(out.glob("figure-*"))) == 4
     estimates = found(result)
     assert estimates["pitch''/pitch"] == pytest.approx(-1.74, rel=0.05)
     assert estimates["yaw''/u2"] == pytest.approx(0.25, rel=0.05)
@@ -389,7 +393,7 @@ def test_when_arrays_are_identified_then_the_model_is_that_of_the_command(tmp_pa
     assert result.estimates["rate_damping_per_s"] == pytest.approx(0.4, rel=0.05)
     assert result.config.timing.tick_s == 0.02
     written = Each(result.identified, result.source, result.settings)
-    Found([written], load_config(), False).save(tmp_path, fly=False)
+    Found([written], load_config(), False).save(tmp_path, fly=False, draw=False)
     log = read_flight_log(load_config(None, tmp_path / "identified.toml"))
     assert log.measured == pytest.approx(record.outputs, abs=1e-8)
     assert log.commands[:, 0] == pytest.approx(record.inputs[:, 0])

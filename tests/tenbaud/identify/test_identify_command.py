@@ -188,8 +188,7 @@ def test_when_a_log_is_of_a_body_at_rest_then_no_model_is_written_and_the_experi
 
 
 def write_columns(path: Path, names: str, *columns: np.ndarray) -> Path:
-    rows = np.hstack(columns)
-    lines = [",".join(f"{value:.6f}" for value in row) for row in rows.tolist()]
+    lines = [",".join(f"{value:.6f}" for value in row) for row in np.hstack(columns).tolist()]
     path.write_text("\n".join([names, *lines]) + "\n")
     return path
 

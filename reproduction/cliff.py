@@ -130,7 +130,7 @@ def claims() -> list[Point]:
     return [*exact, *own, *end, Point("furuta", 50.0, False)]
 
 
-QUICK = sweep({"pendulum": 2, "furuta": 2}, {"pendulum": 10.0, "furuta": 5.0}, (1.0, 1.2, 2.0))
+QUICK = sweep({"pendulum": 2, "furuta": 2}, {"pendulum": 5.0, "furuta": 3.0}, (1.0, 1.2, 2.0))
 FULL = sweep({"pendulum": 20, "furuta": 10}, {"pendulum": 120.0, "furuta": 60.0}, RATIOS)
 
 

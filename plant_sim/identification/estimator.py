@@ -123,18 +123,7 @@ def estimate(
         if not (math.isfinite(gain) and gain > 0.0):
             raise IdentificationError(f"gain is {gain}; it must be finite and above 0")
         start = np.full(size, 1.0 / gain)
-    bound = 10.0 * float(np.sqrt(np.sum(start**-2.0)))
-    information, product = np.diag(start), np.zeros(size)
-    inverse = np.diag(1.0 / start)
-    history = np.empty((len(moments.products), size))
-    kept = np.empty(len(history))
-    for index, (more, pulled) in enumerate(zip(moments.regressors, moments.products, strict=True)):
-        share = max(0.0, 1.0 - math.sqrt(float((inverse * inverse).sum())) / bound)
-        kept[index] = left = math.exp(-forgetting_per_s * share * moments.block_s)
-        information = left * information + more
-        product = left * product + pulled
-        inverse = np.linalg.inv(information)
-        history[index] = inverse @ product
+    history, inverse, kept = _run(moments, start, forgetting_per_s)
     values = history[-1]
     weights = np.append(np.cumprod(kept[:0:-1])[::-1], 1.0)
     covariance = _covariance(moments, values, inverse, weights, memory_s)
@@ -155,6 +144,28 @@ def estimate(
         math.sqrt(max(0.0, float(weights @ errors)) / remembered),
         math.sqrt(float(weights @ moments.targets) / remembered),
     )
+
+
+def _run(moments: Moments, start: Array, forgetting_per_s: float) -> tuple[Array, Array, Array]:
+    """Return the estimates after each block, Gamma after the last, and what each leaves of the sums."""
+    kept = np.ones(len(moments.products))
+    if forgetting_per_s == 0.0:
+        # The sums do not depend on Gamma then: all of them are inverted in one go.
+        sums = np.cumsum(np.concatenate((np.diag(start)[None], moments.regressors)), axis=0)[1:]
+        inverses = np.linalg.inv(sums)
+        history = (inverses @ np.cumsum(moments.products, axis=0)[:, :, None])[:, :, 0]
+        return history, inverses[-1], kept
+    bound = 10.0 * float(np.sqrt(np.sum(start**-2.0)))
+    information, product = np.diag(start), np.zeros(len(start))
+    inverse, history = np.diag(1.0 / start), np.empty_like(moments.products)
+    for index, (more, pulled) in enumerate(zip(moments.regressors, moments.products, strict=True)):
+        share = max(0.0, 1.0 - math.sqrt(float((inverse * inverse).sum())) / bound)
+        kept[index] = left = math.exp(-forgetting_per_s * share * moments.block_s)
+        information = left * information + more
+        product = left * product + pulled
+        inverse = np.linalg.inv(information)
+        history[index] = inverse @ product
+    return history, inverse, kept
 
 
 def _covariance(

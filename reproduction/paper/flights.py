@@ -21,6 +21,8 @@ from channel.errors import TenbaudError
 from reproduction.paper.curves import Curves
 
 WORKERS = 2
+ALONE = 6.0
+"""weight of what takes less time in this process than workers take to start"""
 GRACE_S = 3.0
 """The signal that ends a worker's flight when the command is interrupted."""
 
@@ -92,21 +94,28 @@ def fly_all(
     on_done: Callable[[str, float], None] = lambda name, weight: None,
 ) -> tuple[dict[str, Flown], dict[str, Any]]:
     """Fly every job and do every task, two at a time, long ones first; return both by name."""
-    # spawn: a forked child would inherit the locks of whatever threads the parent has.
-    context = multiprocessing.get_context("spawn")
     flights = [Task(job.name, fly, (job, folder), job.weight) for job in jobs]
     ordered = sorted([*flights, *tasks], key=lambda task: -task.weight)
     flown: dict[str, Flown] = {}
     others: dict[str, Any] = {}
+
+    def keep(task: Task, result: Any) -> None:
+        (flown if task.function is fly else others)[task.name] = result
+        on_done(task.name, task.weight)
+
+    if sum(task.weight for task in ordered) <= ALONE:
+        for task in ordered:
+            keep(task, task.function(*task.arguments))
+        return flown, others
+    # spawn: a forked child would inherit the locks of whatever threads the parent has.
+    context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(WORKERS, context, initializer=_leave_interrupts_to_parent) as pool:
         waiting: dict[Future[Any], Task] = {
             pool.submit(task.function, *task.arguments): task for task in ordered
         }
         try:
             for done in as_completed(waiting):
-                task = waiting[done]
-                (flown if task.function is fly else others)[task.name] = done.result()
-                on_done(task.name, task.weight)
+                keep(waiting[done], done.result())
         except BaseException:
             _end_workers()
             raise

@@ -162,19 +162,16 @@ class Result:
     def save(self, folder: Path, *, fly: bool = True, draw: bool = True) -> None:
         """Write figures and configurations, and fly each record with its own."""
         if draw:
-            self._draw(folder)
+            from tenbaud.identification.figures import draw_estimates, draw_excitation
+
+            found = [one.identified for one in self.each]
+            draw_excitation(found, [folder / "figure-3.png", folder / "figure-3.svg"])
+            true = true_values(self.base) if self.simulated else self.each[0].beside.get(TRUE)
+            draw_estimates(found, [folder / "figure-4.png", folder / "figure-4.svg"], true)
         for index, one in enumerate(self.each):
             number = "" if index == 0 else f"-{index + 1}"
             if one.settings:
                 _finish(one, folder, number, fly)
-
-    def _draw(self, folder: Path) -> None:
-        from tenbaud.identification.figures import draw_estimates, draw_excitation
-
-        found = [one.identified for one in self.each]
-        draw_excitation(found, [folder / "figure-3.png", folder / "figure-3.svg"])
-        true = true_values(self.base) if self.simulated else self.each[0].beside.get(TRUE)
-        draw_estimates(found, [folder / "figure-4.png", folder / "figure-4.svg"], true)
 
 
 def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:

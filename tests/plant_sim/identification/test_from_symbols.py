@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from plant_sim.identification.likelihood import follow, update
 from plant_sim.identification.structures import parse_linear
 from plant_sim.identification.symbols import Symbols
 from tenbaud.studies.compiled import compiled
+
+Filter = Callable[..., float]
 
 PERIOD_S = 0.1
 TICKS = 5
@@ -72,13 +76,19 @@ def flight(seconds: float, flipped: float, moves: float = 1.0) -> Symbols:
     )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def fast() -> Filter:
+    """Return the filter, compiled: once for the tests of this file."""
+    return cast("Filter", compiled(follow))
+
+
 START = {"a_1": 0.5, "a_2": 2.6, "b_0": 1.2, "d": 0.0}
 SISO = parse_linear("siso:2,0", ("y",), ("u",))
 
 
 @pytest.mark.parametrize("flipped", [0.0, 0.04])
-def test_when_a_plant_moves_then_its_signs_give_its_parameters(flipped: float) -> None:
-    found = identify_symbols(flight(40.0, flipped), SISO, 0.0, START, compiled(follow))
+def test_when_a_plant_moves_then_its_signs_give_its_parameters(flipped: float, fast: Filter) -> None:
+    found = identify_symbols(flight(40.0, flipped), SISO, 0.0, START, fast)
     assert found.refused == ()
     true = {"a_1": 0.8, "a_2": 2.0, "b_0": 1.5, "d": 0.0}
     for item in found.parameters:
@@ -87,8 +97,8 @@ def test_when_a_plant_moves_then_its_signs_give_its_parameters(flipped: float) -
     assert 1e-4 < found.densities[0] < 2e-3  # 4e-4
 
 
-def test_when_nothing_moves_the_plant_then_the_parameters_are_refused_by_name() -> None:
-    found = identify_symbols(flight(20.0, 0.0, moves=1e-3), SISO, 0.0, START, compiled(follow))
+def test_when_nothing_moves_the_plant_then_the_parameters_are_refused_by_name(fast: Filter) -> None:
+    found = identify_symbols(flight(20.0, 0.0, moves=1e-3), SISO, 0.0, START, fast)
     assert any("b_0" in text and "uncertain" in text for text in found.refused)
 
 
@@ -96,10 +106,10 @@ def ordered(values: Array) -> bool:
     return bool(np.all(np.diff(values) > 0.0))
 
 
-def test_when_the_estimates_are_drawn_then_they_begin_at_the_model_that_flew_and_end_at_the_last() -> (
-    None
-):
-    found = identify_symbols(flight(20.0, 0.0), SISO, 0.0, START, compiled(follow))
+def test_when_the_estimates_are_drawn_then_they_begin_at_the_model_that_flew_and_end_at_the_last(
+    fast: Filter,
+) -> None:
+    found = identify_symbols(flight(20.0, 0.0), SISO, 0.0, START, fast)
     history = found.regression.estimates[0].history
     assert ordered(found.regression.times_s)
     assert len(found.regression.times_s) == len(history) == len(found.regression.filtered_input)

@@ -324,3 +324,17 @@ def test_when_filters_are_far_from_the_motion_then_both_frequencies_are_named() 
     assert any("filters of" in text for text in chosen.notes)
     given = identify(Record(H, y, u), structure, Options(bandwidth_rad_s=1.0))
     assert any("--bandwidth" in text for text in given.notes)
+
+
+@pytest.mark.parametrize("gain", [None, 1e3])
+def test_when_nothing_is_forgotten_then_all_blocks_at_once_give_what_they_give_in_turn(
+    gain: float | None,
+) -> None:
+    random = np.random.default_rng(4)
+    regressors = random.normal(size=(300, 3)) * [1.0, 0.1, 5.0]
+    moments = moments_of(regressors, regressors @ [1.0, -2.0, 0.3] + random.normal(size=300), 0.01, 1)
+    at_once = estimate(moments, forgetting_per_s=0.0, gain=gain)
+    in_turn = estimate(moments, forgetting_per_s=1e-300, gain=gain)
+    assert at_once.history == pytest.approx(in_turn.history, rel=1e-9)
+    assert at_once.covariance == pytest.approx(in_turn.covariance, rel=1e-9)
+    assert at_once.residual == pytest.approx(in_turn.residual, rel=1e-12)

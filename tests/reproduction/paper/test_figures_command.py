@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from reproduction.paper import plan
 from tenbaud.cli.commands import app
 from tests.reproduction.paper.recorded_data import FOLDER, needs_data
 from tests.rules.sources import TOP
@@ -27,8 +28,9 @@ def is_png(path: Path) -> bool:
 
 
 def test_when_figure_7_is_asked_for_then_two_processes_fly_twice_and_it_is_drawn(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(plan, "DURATION_S", 30.0)
     out = tmp_path / "out"
     said = run("7", "--out", str(out))
     assert "2 flights" in said

@@ -65,7 +65,10 @@ def test_when_the_floor_is_minimised_then_it_is_the_number_of_the_page() -> None
 
 def test_when_the_lead_grows_then_the_coded_error_stays_and_the_live_one_does_not() -> None:
     near, far = (
-        theory.errors_of("tuned-10baud", theory.with_torque({"timing": {"lead_ticks": lead}}))
+        theory.errors_of(
+            "tuned-10baud",
+            theory.with_torque({"duration_s": 80.0, "timing": {"lead_ticks": lead}}),
+        )
         for lead in (0, 50)
     )
     assert near.live_rad == near.coded_rad

@@ -26,6 +26,7 @@ from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 from tenbaud.replay.refly import Reflown, flown_again
 from tenbaud.replay.replay import compare
 from tenbaud.replay.rows import Topic
+from tenbaud.replay.walk import Walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,8 +181,9 @@ def _fly(evidence: Evidence) -> None:
 
 def _flown(evidence: Evidence, controller: Controller) -> list[Reflown] | None:
     """Return the flight flown again, None where it leads to states that no codec has."""
+    evidence.walk = Walk()
     try:
-        return list(flown_again(evidence.agreement, controller, evidence.epochs))
+        return list(flown_again(evidence.agreement, controller, evidence.epochs, evidence.walk.first))
     except (CodecDiverged, OverflowError):
         return None
 

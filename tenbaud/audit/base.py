@@ -16,6 +16,7 @@ from tenbaud.replay.pack import Epoch
 from tenbaud.replay.record import FlightRecord
 from tenbaud.replay.refly import Reflown
 from tenbaud.replay.rows import EndRows, Topic
+from tenbaud.replay.walk import Walk
 
 FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
@@ -80,6 +81,8 @@ class Evidence:
     epochs: list[Epoch] = field(default_factory=list)
     flown: list[Reflown] = field(default_factory=list)
     """the flight, flown again from its words; empty where it cannot be"""
+    walk: Walk = field(default_factory=Walk)
+    """through that flight"""
     steps: tuple[tuple[int, float], ...] = ()
     """set-points that are not the configuration's: (tick, angle)"""
     jittered_states: int = 0

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from channel.codec.codec import Alphabet
 from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
+from tenbaud.replay.bits import is_same
 from tenbaud.replay.expected import Expected
 from tenbaud.replay.pack import Epoch
 from tenbaud.replay.record import FlightRecord
@@ -167,8 +168,3 @@ class Claim:
 def claim(title: str, *owns: tuple[str, ...]) -> Callable[[Check], Claim]:
     """Make a check a claim on fields, each given as (end, topic, field, field ...)."""
     return lambda check: Claim(title, owns, check)
-
-
-def is_same(one: object, other: object) -> bool:
-    """Whether two values are equal to the last bit; 0.0 and -0.0 are not."""
-    return one == other and repr(one) == repr(other)

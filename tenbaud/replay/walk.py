@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.lead import Decide, FlownSample, Fly, fly_sample
+from tenbaud.replay.bits import is_same
 
 
 class _Call(NamedTuple):
@@ -55,7 +56,7 @@ class Walk:
             decided: dict[int, Vector] = {}
             for tick, live, command in zip(count(first), flown.live, flown.commands, strict=False):
                 decided[tick] = decide(tick, live)
-                if not _is_same(decided[tick], command):
+                if not is_same(decided[tick], command):
                     break
             else:
                 return flown
@@ -71,10 +72,5 @@ class Walk:
 def _is_asked_again(call: _Call, state: CodecState, word: Word, known: Sequence[Vector]) -> bool:
     if word != call.word or len(known) != len(call.known):
         return False
-    pairs = zip((state, *known), (call.state, *call.known), strict=True)
-    return all(one is other or _is_same(one, other) for one, other in pairs)
-
-
-def _is_same(one: object, other: object) -> bool:
-    """Whether two values are equal to the last bit; 0.0 and -0.0 are not."""
-    return one == other and repr(one) == repr(other)
+    pairs = zip((*state, *known), (*call.state, *call.known), strict=True)
+    return all(is_same(one, other) for one, other in pairs)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import marshal
+from typing import Any
 
 FORMAT = 2
 """of `marshal`: floats as their bytes, and nothing that depends on how the values are held"""
 
 
-def is_same(one: object, other: object) -> bool:
+def is_same(one: Any, other: Any) -> bool:
     """Return whether two values are equal, of the same types and to the last bit; 0.0 is not -0.0.
 
     Values of a row: numbers, texts, None, and tuples of numbers.

@@ -96,7 +96,7 @@ class Audit:
     notes: list[str] = field(default_factory=list)
     digests_compared: int = 0
     jittered_states: int = 0
-    """states that were computed again with other arrival times"""
+    """states of the flights with other arrival times"""
     rejoin_bytes: int = 0
     """of start states, which went down the link"""
 

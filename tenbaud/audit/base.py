@@ -87,7 +87,7 @@ class Evidence:
     steps: tuple[tuple[int, float], ...] = ()
     """set-points that are not the configuration's: (tick, angle)"""
     jittered_states: int = 0
-    """states that were computed again with other arrival times"""
+    """states of the flights with other arrival times"""
     expected: Expected | None = None
     """the expected content of the recordings; None if unknown"""
 

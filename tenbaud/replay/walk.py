@@ -60,7 +60,7 @@ class Walk:
                     break
             else:
                 return flown
-            # Nobody is asked twice for a tick.
+            # A controller is asked once for a tick.
             return fly_sample(
                 *(codec, state, word, known),
                 lambda tick, live: decided[tick] if tick in decided else decide(tick, live),

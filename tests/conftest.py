@@ -72,9 +72,14 @@ PAGES = "tests/docs/test_commands.py::test_when_a_page_is_typed_in_then"
 """On two workers, each with one process that has imported everything (`tests/docs/prepared.py`)."""
 
 COLD = (
-    "tests/tenbaud/endings/",
-    "tests/tenbaud/test_restarts.py",
-    "tests/tenbaud/test_not_flown.py",
+    "tests/tenbaud/endings/test_containers.py",
+    "tests/tenbaud/endings/test_nonsense.py",
+    "tests/tenbaud/endings/test_short_commands.py",
+    "tests/tenbaud/endings/test_signals.py::test_a_demo_ends",
+    "tests/tenbaud/endings/test_signals.py::test_a_lasting_command",
+    "tests/tenbaud/endings/test_signals.py::test_what_is_interrupted",
+    "tests/tenbaud/endings/test_streams.py",
+    "tests/tenbaud/test_restarts.py::test_when_the_ends_are_killed_twenty_times",
     "tests/tenbaud/view/test_gate.py",
     "tests/tenbaud/view/test_beside.py",
     "tests/network/test_pages.py",

@@ -111,6 +111,10 @@ def _tick(
     return closed, flight.tick(model, command, held)
 
 
+Fly = Callable[[Codec, CodecState, Word, Sequence[Vector], Decide], FlownSample]
+"""`fly_sample`, or what gives the same sample."""
+
+
 def fly_sample(
     codec: Codec, state: CodecState, word: Word, known: Sequence[Vector], decide: Decide
 ) -> FlownSample:

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWayState
-from channel.codec.lead import FlownSample, fly_sample
+from channel.codec.lead import FlownSample, Fly, fly_sample
 from channel.errors import CodecDiverged
 from channel.protocol.compact import compact_form
 from channel.protocol.frames import Commands, Echo, Frame
@@ -169,9 +169,16 @@ class EchoCommander(Commander):
     """
 
     def __init__(
-        self, codec: Codec, terms: Terms, asker: Asker, recorder: Recorder, begins: Begins | None
+        self,
+        codec: Codec,
+        terms: Terms,
+        asker: Asker,
+        recorder: Recorder,
+        begins: Begins | None,
+        fly: Fly = fly_sample,
     ) -> None:
         super().__init__(codec, terms, asker, recorder, begins)
+        self._fly_sample = fly
         self._state = codec.initial()
         self.hold = terms.initial_command
         """last command decided"""
@@ -240,7 +247,7 @@ class EchoCommander(Commander):
     def _flown(self, word: Word) -> FlownSample:
         """Fly a sample with the commands that the controller decides, or with their mean held."""
         known, held = tuple(self._commands), self.hold
-        flown = fly_sample(self.codec, self._state, word, known, self._decide)
+        flown = self._fly_sample(self.codec, self._state, word, known, self._decide)
         if self.compact is None:
             return flown
         # The law's first command, held, would steer half a sample late. The mean moves the plant as the
@@ -248,7 +255,7 @@ class EchoCommander(Commander):
         steps = self.compact.held(flown.commands, held)
         self.hold = from_steps(steps, self.terms.signals)
         self._steps = [*steps] * self.terms.ticks_per_sample
-        return fly_sample(self.codec, self._state, word, known, lambda _tick, _state: self.hold)
+        return self._fly_sample(self.codec, self._state, word, known, lambda _tick, _state: self.hold)
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit its command, and return it as sent on the wire."""

@@ -17,6 +17,7 @@ from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, CodecState
 from channel.codec.downlink.machine import TwoWay
+from channel.codec.lead import Fly, fly_sample
 from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.endings import End, Ending
@@ -62,7 +63,7 @@ class ReceiverSession:
 
     `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
     deterministic. `take_over`: claim a flight that another receiver has. `two_way`: the state machine
-    of the narrow downlink.
+    of the narrow downlink. `fly`: what computes the samples of another downlink.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class ReceiverSession:
         take_over: bool = False,
         begins: Begins | None = None,
         two_way: TwoWay | None = None,
+        fly: Fly = fly_sample,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -98,7 +100,7 @@ class ReceiverSession:
         self._recorder = recorder or NullRecorder()
         asker = Asker(controller, len(terms.signals.outputs), self.counts, self._emit)
         self._commander: Commander = (
-            EchoCommander(codec, terms, asker, self._recorder, begins)
+            EchoCommander(codec, terms, asker, self._recorder, begins, fly)
             if two_way is None
             else NarrowCommander(two_way, terms, asker, self._recorder, begins)
         )

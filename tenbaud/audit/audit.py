@@ -26,6 +26,7 @@ from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 from tenbaud.replay.refly import Reflown, flown_again
 from tenbaud.replay.replay import compare
 from tenbaud.replay.rows import Topic
+from tenbaud.replay.walk import Walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,7 @@ class Audit:
     notes: list[str] = field(default_factory=list)
     digests_compared: int = 0
     jittered_states: int = 0
-    """states that were computed again with other arrival times"""
+    """states of the flights with other arrival times"""
     rejoin_bytes: int = 0
     """of start states, which went down the link"""
 
@@ -180,8 +181,9 @@ def _fly(evidence: Evidence) -> None:
 
 def _flown(evidence: Evidence, controller: Controller) -> list[Reflown] | None:
     """Return the flight flown again, None where it leads to states that no codec has."""
+    evidence.walk = Walk()
     try:
-        return list(flown_again(evidence.agreement, controller, evidence.epochs))
+        return list(flown_again(evidence.agreement, controller, evidence.epochs, evidence.walk.first))
     except (CodecDiverged, OverflowError):
         return None
 

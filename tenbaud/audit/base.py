@@ -11,11 +11,13 @@ from typing import Any, NamedTuple
 from channel.codec.codec import Alphabet
 from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
+from tenbaud.replay.bits import is_same
 from tenbaud.replay.expected import Expected
 from tenbaud.replay.pack import Epoch
 from tenbaud.replay.record import FlightRecord
 from tenbaud.replay.refly import Reflown
 from tenbaud.replay.rows import EndRows, Topic
+from tenbaud.replay.walk import Walk
 
 FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
@@ -80,10 +82,12 @@ class Evidence:
     epochs: list[Epoch] = field(default_factory=list)
     flown: list[Reflown] = field(default_factory=list)
     """the flight, flown again from its words; empty where it cannot be"""
+    walk: Walk = field(default_factory=Walk)
+    """through that flight"""
     steps: tuple[tuple[int, float], ...] = ()
     """set-points that are not the configuration's: (tick, angle)"""
     jittered_states: int = 0
-    """states that were computed again with other arrival times"""
+    """states of the flights with other arrival times"""
     expected: Expected | None = None
     """the expected content of the recordings; None if unknown"""
 
@@ -164,8 +168,3 @@ class Claim:
 def claim(title: str, *owns: tuple[str, ...]) -> Callable[[Check], Claim]:
     """Make a check a claim on fields, each given as (end, topic, field, field ...)."""
     return lambda check: Claim(title, owns, check)
-
-
-def is_same(one: object, other: object) -> bool:
-    """Whether two values are equal to the last bit; 0.0 and -0.0 are not."""
-    return one == other and repr(one) == repr(other)

@@ -100,7 +100,8 @@ def jittered(evidence: Evidence, controller: Controller, seed: int) -> list[Refl
     """Return the flight, flown again with its symbols at other times within their deadlines."""
     noise, most_ns = random.Random(JITTER_SEED + seed), evidence.terms.deadline_allowance_ns
     epochs = evidence.epochs
-    return list(refly(evidence.agreement, controller, epochs, lambda _slot: noise.randint(0, most_ns)))
+    times = lambda _slot: noise.randint(0, most_ns)  # noqa: E731
+    return list(refly(evidence.agreement, controller, epochs, times, evidence.walk.again()))
 
 
 def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before) -> bool:

@@ -6,10 +6,11 @@ import math
 from collections import Counter
 from typing import Any
 
-from tenbaud.audit.base import Evidence, claim, is_same
+from tenbaud.audit.base import Evidence, claim
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
 from tenbaud.build.signals import build_encoders
+from tenbaud.replay.bits import is_same
 
 TICK = ("transmitter", "tick")
 STOPPED = ("ramping", "latched")

@@ -56,7 +56,7 @@ def _counts(result: Audit) -> list[str]:
 def _shown(result: Audit) -> list[str]:
     return [
         f"{result.digests_compared} recorded states computed again from symbols and slots",
-        f"{result.jittered_states} states computed with other arrival times within the deadlines",
+        f"{result.jittered_states} states reached with other arrival times within the deadlines",
     ]
 
 

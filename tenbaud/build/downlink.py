@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import asdict
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.downlink.coded import CodedCommands, CodedDirection
@@ -19,7 +19,7 @@ from channel.codec.downlink.machine import TwoWay
 from channel.codec.downlink.mirrored import Law, MirroredLaw
 from channel.codec.laws import FeedbackLaw
 from channel.line.impairments import parse_impairments
-from channel.protocol.terms import Rung, Terms
+from channel.protocol.terms import Terms
 from receiver.controllers.base import Controller
 from receiver.controllers.pid import PidLoops
 from receiver.controllers.state_feedback import StateFeedback
@@ -114,13 +114,8 @@ def said_by_words(two_way: TwoWay | None) -> dict[int, tuple[float, float]]:
 
 
 def require_effect(config: FlightConfig, terms: Terms) -> None:
-    """Raise ConfigError for a setting of the downlink that is misplaced and would change nothing."""
-    link, section, fields = config.link.downlink, config.downlink, DownlinkSection.model_fields
-    if link in get_args(Rung):
-        raise ConfigError(
-            f"link.downlink = {link!r}: it names the link of the commands; what comes down it is "
-            f"channel.downlink = {link!r}"
-        )
+    """Raise ConfigError for a setting of the narrow downlink that would change nothing."""
+    section, fields = config.downlink, DownlinkSection.model_fields
     if not terms.is_narrow:
         return
     flown, other = ("mirrored", "coded") if terms.is_mirrored else ("coded", "mirrored")

@@ -7,7 +7,6 @@ Only `tenbaud.log` knows what files look like; here it is known what a flight ne
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from hashlib import blake2b
 from pathlib import Path
@@ -36,6 +35,7 @@ from tenbaud.config.load import (
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.models import ModelSection as BuiltInModel
 from tenbaud.config.schema import FlightConfig, Timing
+from tenbaud.config.warned import warn
 
 PRESET = "uiuc-10baud"
 """Of a recording for which none is given."""
@@ -82,7 +82,7 @@ def _warn_of_downlink(given: set[str], config: FlightConfig) -> None:
     unused = [one for one in given if one == "channel.downlink_baud" or one.startswith("downlink.")]
     if unused and rung != "narrow":
         text = f'{", ".join(sorted(unused))}: without effect with channel.downlink = "{rung}"'
-        warnings.warn(f'{text}: set "narrow", or leave it out', UserWarning, stacklevel=3)
+        warn(f'{text}: set "narrow", or leave it out', UserWarning)
 
 
 def _decided(given: set[str], config: FlightConfig) -> set[str]:

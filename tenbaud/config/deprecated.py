@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
-import warnings
 from typing import Any
+
+from tenbaud.config.warned import warn as warn_of
 
 RENAMED: dict[str, dict[str, str]] = {
     "preset": {"timed-10baud": "open-loop-zoom-10baud"},
@@ -43,8 +44,7 @@ def current_name(place: str, name: str, source: str, *, warn: bool = True) -> st
     """Return the present name of a value; warn, if asked to, where `name` is an old one."""
     new = RENAMED[place].get(name, name)
     if warn and new != name:
-        text = f"{source}: {place}: {name!r} is deprecated; use {new!r}"
-        warnings.warn(text, FutureWarning, stacklevel=3)
+        warn_of(f"{source}: {place}: {name!r} is deprecated; use {new!r}", FutureWarning)
     return new
 
 
@@ -63,8 +63,7 @@ def with_current_names(values: dict[str, Any], source: str, *, warn: bool = True
         if not isinstance(here, dict) or field not in here:
             continue
         if warn:
-            text = f"{source}: {old!r} is deprecated; use {new!r}"
-            warnings.warn(text, FutureWarning, stacklevel=3)
+            warn_of(f"{source}: {old!r} is deprecated; use {new!r}", FutureWarning)
         *sections, name = new.split(".")
         there: Any = values
         for section in sections:
@@ -92,7 +91,7 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
             continue
         if warn:
             text = f"{source}: 'flight_log.{old}' is deprecated; use 'flight_log.columns'"
-            warnings.warn(text, FutureWarning, stacklevel=4)
+            warn_of(text, FutureWarning)
         if isinstance(value, (list, tuple)):
             value = {str(at): name for at, name in enumerate(value, 1)}
         named = {f"{new}{name}": one for name, one in value.items()} if new[-1] == ":" else {new: value}

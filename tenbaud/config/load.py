@@ -9,12 +9,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
+from channel.protocol.terms import Rung
 from tenbaud.config.deprecated import current_name, with_current_names
 from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.schema import KINDS, FlightConfig
@@ -111,7 +112,21 @@ def merged_values(
     values = _read_preset(base)
     if mission := given.get("mission", from_file.get("mission", "")):
         values = merged(values, _read_preset(str(mission), "mission"))
-    return merged(merged(values, from_file), given) | {"preset": base}
+    found = merged(merged(values, from_file), given) | {"preset": base}
+    if not recorded:
+        _refuse_misplaced(found, source)
+    return found
+
+
+def _refuse_misplaced(values: Mapping[str, Any], source: str) -> None:
+    """Raise ConfigError for a kind of downlink where its link belongs: that would change nothing."""
+    link = values.get("link")
+    name = link.get("downlink") if isinstance(link, Mapping) else None
+    if name in get_args(Rung):
+        raise ConfigError(
+            f"{source}, with the command line over it:\n  link.downlink = {name!r}: it names the link "
+            f"of the commands; what comes down it is channel.downlink = {name!r}"
+        )
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -125,9 +125,10 @@ def _rate(run: TransmitterRun) -> Summary:
     if run.ticks:
         samples = run.ticks / terms.ticks_per_sample
         if terms.is_narrow:
-            # Whether the last words were consumed was not certain yet.
-            samples = max(1, counts["confirmed"])
-        share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
+            # Whether the last words were consumed, in a short flight all, was not certain yet.
+            samples = counts["confirmed"]
+        if samples:
+            share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
     return {
         "symbols_per_s_asked": asked,
         "symbols_per_s_kept": None if share is None else share * asked,

@@ -8,7 +8,7 @@ is a RecordingError. Every command reads recordings with this module.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO
@@ -232,10 +232,14 @@ class Recording:
 
     def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
         """Stream (flight time in ns, row) of one topic; nothing if the topic is absent."""
+        for block in self.blocks((topic,)):
+            yield from zip(*block[topic], strict=True)
+
+    def blocks(self, topics: Iterable[str]) -> Iterator[dict[str, tuple[list[int], list[Row]]]]:
+        """Stream the flight times in ns and the rows of some topics, block by block in one pass."""
         # All passes end where the first one did, also in a file that still grows.
         size = self._survey.size if "_survey" in vars(self) else None
-        for block in rows_in_blocks(MessageStream(self.path, size), {topic: None}):
-            yield from zip(*block[topic], strict=True)
+        return rows_in_blocks(MessageStream(self.path, size), dict.fromkeys(topics))
 
     @cached_property
     def topics(self) -> dict[str, Table]:

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.codec.lead import Fly, fly_sample
 from channel.errors import CodecDiverged
 from channel.protocol.frames import Hello, Symbol, Welcome
 from channel.protocol.terms import Terms
@@ -54,10 +55,14 @@ def refly(
     controller: Controller,
     epochs: Sequence[Epoch],
     delay: Delay = lambda _slot: 0,
+    fly: Fly = fly_sample,
 ) -> Iterator[Reflown]:
-    """Yield the samples of a flight, flown again from the words of its epochs."""
+    """Yield the samples of a flight, flown again from the words of its epochs.
+
+    `fly` computes the samples of a downlink that is not narrow.
+    """
     for place, epoch in enumerate(epochs):
-        yield from _refly_epoch(agreement, controller, place, epoch, delay)
+        yield from _refly_epoch(agreement, controller, place, epoch, delay, fly)
 
 
 class _Starting(Codec):
@@ -83,7 +88,7 @@ class _StartingTwoWay(TwoWay):
 
 
 def _refly_epoch(
-    agreement: Agreement, controller: Controller, place: int, epoch: Epoch, delay: Delay
+    agreement: Agreement, controller: Controller, place: int, epoch: Epoch, delay: Delay, fly: Fly
 ) -> Iterator[Reflown]:
     terms = replace(agreement.terms, initial_command=epoch.hold)
     codec = _Starting(agreement.codec, epoch.start)
@@ -91,8 +96,8 @@ def _refly_epoch(
     machine = with_codec(agreement.two_way, codec)
     if machine is not None and epoch.two_way is not None:
         machine = _StartingTwoWay(machine, epoch.two_way)
-    session = ReceiverSession(codec, terms, controller, agreement.identity, 1, rows, two_way=machine)
     identity = agreement.identity
+    session = ReceiverSession(codec, terms, controller, identity, 1, rows, two_way=machine, fly=fly)
     hello = Hello(1, identity.version, identity.config_digest, identity.numerics_probe)
     (welcome,) = session.on_frame(hello, 0)
     if not isinstance(welcome, Welcome):
@@ -139,12 +144,12 @@ def _taken(rows: MemoryRecorder, place: int) -> Iterator[Reflown]:
 
 
 def flown_again(
-    agreement: Agreement, controller: Controller, epochs: Sequence[Epoch]
+    agreement: Agreement, controller: Controller, epochs: Sequence[Epoch], fly: Fly = fly_sample
 ) -> Iterator[Reflown]:
     """Yield the samples of a flight; where it is narrow the controller gives its set-points only."""
     machine = agreement.two_way
     if machine is None:
-        yield from refly(agreement, controller, epochs)
+        yield from refly(agreement, controller, epochs, fly=fly)
         return
     for place, epoch in enumerate(epochs):
         yield from _stepped(machine, agreement.terms, controller, place, epoch)

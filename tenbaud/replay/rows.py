@@ -7,6 +7,7 @@ error names topic, row and field of a row that does not fit.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from channel.protocol.recording import Field
 from tenbaud.recording.kinds import KINDS, Kind
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.recover import RECOVERED_NOTE
+from tenbaud.recording.rows import Row
 
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
@@ -70,38 +72,57 @@ class EndRows:
 
 def read_rows(end: str, tables: Recording) -> EndRows:
     """Return the rows of one end; those that do not fit are left out and listed as misfits."""
-    misfits: list[Misfit] = []
-    topics: dict[str, Topic] = {}
-    for name, kind in KINDS[end].items():
-        table = tables.topics.get(name)
-        topics[name] = Topic() if table is None else _typed(name, kind, tables, misfits)
-    foreign = [name for name in tables.topics if name not in KINDS[end]]
+    kinds = KINDS[end]
+    typed = {
+        name: _Typed(kind, tables.topics[name].names)
+        for name, kind in kinds.items()
+        if name in tables.topics
+    }
+    for block in tables.blocks([name for name, one in typed.items() if one.is_whole]):
+        for name, (times_ns, rows) in block.items():
+            typed[name].add(times_ns, rows)
+    topics = {name: typed[name].topic if name in typed else Topic() for name in kinds}
+    misfits = [misfit for one in typed.values() for misfit in one.misfits]
+    foreign = [name for name in tables.topics if name not in kinds]
     complete = bool(tables.end) and RECOVERED_NOTE not in tables.end
     return EndRows(end, complete, topics, misfits, foreign)
 
 
-def _typed(name: str, kind: Kind, tables: Recording, misfits: list[Misfit]) -> Topic:
-    topic, names = Topic(recorded=True), tables.topics[name].names
-    lacking = [one.name for one in kind.channel.fields if one.name not in names]
-    if lacking:
-        misfits.append(Misfit(name, "every row", lacking[0], "this field is not recorded"))
-        return topic
-    fields = kind.channel.fields
-    make = kind.record._make
-    for index, (time_ns, row) in enumerate(tables.rows(name)):
-        read = (row.get(one.name) for one in fields)
-        values: list[Any] = [tuple(value) if type(value) is list else value for value in read]
-        pairs = zip(fields, values, strict=True)
-        wrong = next((one for one, value in pairs if not _fits(value, one, kind)), None)
-        if wrong is None and fields[0].type == "integer" and not 0 <= values[0] <= KEY_MAX:
-            wrong = fields[0]
-        if wrong is not None:
-            value = row.get(wrong.name)
-            misfits.append(Misfit(name, f"row {index}", wrong.name, f"it holds {value!r:.60}"))
-            continue
-        topic.rows.append(make(values))
-        topic.times_ns.append(time_ns)
-    return topic
+class _Typed:
+    """A topic, made of its rows as a pass over the file brings them."""
+
+    def __init__(self, kind: Kind, names: Collection[str]) -> None:
+        """`names` are the fields that the recording has."""
+        self.topic = Topic(recorded=True)
+        self.misfits: list[Misfit] = []
+        self._kind = kind
+        self._count = 0
+        lacking = [one.name for one in kind.channel.fields if one.name not in names]
+        self.is_whole = not lacking
+        if lacking:
+            self._miss("every row", lacking[0], "this field is not recorded")
+
+    def add(self, times_ns: Sequence[int], rows: Sequence[Row]) -> None:
+        """Add the next rows; those that do not fit become misfits."""
+        kind = self._kind
+        fields, make = kind.channel.fields, kind.record._make
+        is_counted = fields[0].type == "integer"
+        for index, (time_ns, row) in enumerate(zip(times_ns, rows, strict=True), self._count):
+            read = [row.get(one.name) for one in fields]
+            values: list[Any] = [tuple(value) if type(value) is list else value for value in read]
+            pairs = zip(fields, values, strict=True)
+            wrong = next((one for one, value in pairs if not _fits(value, one, kind)), None)
+            if wrong is None and is_counted and not 0 <= values[0] <= KEY_MAX:
+                wrong = fields[0]
+            if wrong is not None:
+                self._miss(f"row {index}", wrong.name, f"it holds {row.get(wrong.name)!r:.60}")
+                continue
+            self.topic.rows.append(make(values))
+            self.topic.times_ns.append(time_ns)
+        self._count += len(rows)
+
+    def _miss(self, row: str, field: str, text: str) -> None:
+        self.misfits.append(Misfit(self._kind.channel.topic, row, field, text))
 
 
 def _fits(value: Any, one: Field, kind: Kind) -> bool:

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 import random
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import orjson
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 
 from tenbaud.audit.base import FILED
 from tenbaud.recording.encoding import channel_schema
@@ -80,9 +79,8 @@ class Original:
                 for row in _some(count - 1, rows_per_topic, noise) if count > 1 else ():
                     yield Mutation(end, topic, row, "swap")
 
-    def write(self, mutation: Mutation, folder: Path, noise: random.Random) -> None:
-        """Write the run with one change into a new folder."""
-        shutil.copytree(self.run, folder)
+    def write(self, mutation: Mutation, path: Path, noise: random.Random) -> None:
+        """Write the recording of the changed end."""
         messages = list(self.messages[mutation.end])
         places = self.rows(mutation.end, mutation.topic)
         at = places[mutation.row]
@@ -102,7 +100,6 @@ class Original:
             case "swap":
                 other = places[mutation.row + 1]
                 messages[at], messages[other] = messages[other], messages[at]
-        path = folder / f"{mutation.end}.mcap"
         write_recording(path, messages, self.streams[mutation.end])
 
 
@@ -133,7 +130,7 @@ def changed(value: Any, noise: random.Random) -> Any:
 def write_recording(path: Path, messages: list[Message], like: MessageStream) -> None:
     """Write a whole recording with these messages, headed as another one."""
     with path.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer = Writer(stream, compression=CompressionType.ZSTD, index_types=IndexType.NONE)
         writer.start(profile="tenbaud", library="tenbaud")
         writer.add_metadata(RUN_METADATA, like.metadata[RUN_METADATA])
         channels: dict[str, int] = {}

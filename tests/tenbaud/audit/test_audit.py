@@ -166,6 +166,27 @@ def test_a_symbol_outside_the_alphabet_is_found(clean: Run, tmp_path: Path) -> N
     assert "slot 9, field symbol: it is not in the coder's alphabet: 2" in told(result)
 
 
+def test_what_a_word_was_about_cannot_be_left_out_of_a_row(clean: Run, tmp_path: Path) -> None:
+    nothing = at("sample", 40, lambda row: {**row, "about": None})
+    result = leaks_of(clean, tmp_path, "transmitter", "sample", nothing)
+    assert "sample 40, field about: it is not what the symbols give: recorded None" in told(result)
+
+
+def test_a_late_tick_that_is_marked_as_another_is_named(rough: Run, tmp_path: Path) -> None:
+    late = [row["tick"] for row in rough.table("transmitter", "tick").rows if row["late"]]
+    # The first after a command, one among others, and the last before a command.
+    for tick in (late[0], late[len(late) // 2], late[-1]):
+        in_time = at("tick", tick, lambda row: {**row, "late": False})
+        result = leaks_of(rough, tmp_path / str(tick), "transmitter", "tick", in_time)
+        assert f"tick {tick}, field late: its command had not come, and one was owed" in told(result)
+
+
+def test_a_gauge_without_any_row_is_missed_row_by_row(clean: Run, tmp_path: Path) -> None:
+    result = leaks_of(clean, tmp_path, "transmitter", "gap", lambda row: [])
+    wanted = "transmitter: gap, sample 9, field sample: it is missing (the first of 8)"
+    assert wanted in result.gaps
+
+
 def test_a_word_that_is_not_the_symbol_of_its_slot_is_found(clean: Run, tmp_path: Path) -> None:
     other = at("sample", 40, lambda row: {**row, "word": [-row["word"][0]]})
     result = leaks_of(clean, tmp_path, "receiver", "sample", other)

@@ -31,9 +31,9 @@ SHARE_MIN = 0.85
 """Of all changes, those that are found; the others are of fields that carry no claim."""
 
 
-def mutant(record: FlightRecord, mutation: Mutation, folder: Path) -> FlightRecord:
+def mutant(record: FlightRecord, mutation: Mutation, path: Path) -> FlightRecord:
     """Return the record of a run of which one recording is another; the rest need not be read anew."""
-    tables = Recording(folder / f"{mutation.end}.mcap")
+    tables = Recording(path)
     rows = {**record.rows, mutation.end: read_rows(mutation.end, tables)}
     return replace(record, tables={**record.tables, mutation.end: tables}, rows=rows)
 
@@ -59,11 +59,11 @@ def is_named(mutation: Mutation, original: Original, result: Audit) -> bool:
 
 
 def survey(
-    run: Path, folder: Path, rows_per_topic: int, without: frozenset[str] = frozenset()
+    run: Path, path: Path, rows_per_topic: int, without: frozenset[str] = frozenset()
 ) -> tuple[int, int, list[str]]:
     """Return how many changes there were, how many were found, and those that should have been.
 
-    No row of the topics `without` is changed.
+    No row of the topics `without` is changed. `path`: where the changed recordings are written.
     """
     original, noise = Original(run), random.Random(SEED)
     record = load_record(run)
@@ -75,10 +75,9 @@ def survey(
         if mutation.topic in without:
             continue
         tried += 1
-        shutil.rmtree(folder, ignore_errors=True)
-        original.write(mutation, folder, noise)
+        original.write(mutation, path, noise)
         try:
-            result = audit_record(mutant(record, mutation, folder))
+            result = audit_record(mutant(record, mutation, path))
         except TenbaudError as error:
             found += 1
             if mutation.topic not in str(error):
@@ -97,7 +96,7 @@ def survey(
 
 
 def test_every_change_of_a_flight_is_found(tmp_path: Path) -> None:
-    tried, found, missed = survey(TWO_EPOCHS, tmp_path / "mutant", 1)
+    tried, found, missed = survey(TWO_EPOCHS, tmp_path / "mutant.mcap", 1)
     assert tried > 110
     assert not missed, "\n".join([f"seed {SEED}", *missed])
     assert found > SHARE_MIN * tried
@@ -106,7 +105,7 @@ def test_every_change_of_a_flight_is_found(tmp_path: Path) -> None:
 def test_every_change_of_a_narrow_flight_is_found(tmp_path: Path) -> None:
     narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.05"}
     run = flown(tmp_path / "run", duration_s=2.0, **narrow)
-    tried, found, missed = survey(run.path, tmp_path / "mutant", 1, AS_IN_ANY_FLIGHT)
+    tried, found, missed = survey(run.path, tmp_path / "mutant.mcap", 1, AS_IN_ANY_FLIGHT)
     assert tried > 60
     assert not missed, "\n".join([f"seed {SEED}", *missed])
     assert found > SHARE_MIN * tried
@@ -128,7 +127,7 @@ def test_every_change_of_many_flights_is_found(
     tmp_path: Path, preset: str, settings: dict[str, object]
 ) -> None:
     run = flown(tmp_path / "run", preset, **{"duration_s": 8.0, **settings})
-    _, _, missed = survey(run.path, tmp_path / "mutant", 6)
+    _, _, missed = survey(run.path, tmp_path / "mutant.mcap", 6)
     assert not missed, "\n".join([f"seed {SEED}", *missed])
 
 

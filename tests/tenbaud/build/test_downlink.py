@@ -156,11 +156,28 @@ def test_other_downlinks_ignore_the_fields_of_the_narrow_one() -> None:
     assert {"downlink", "downlink_baud"}.isdisjoint(json.loads(plain.shared_json(0))["channel"])
 
 
+def test_a_kind_of_downlink_in_place_of_its_link_is_refused_as_the_file_is_loaded(
+    tmp_path: Path,
+) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text('[link]\ndownlink = "narrow"\n')
+    for load in (load_config, flight_config):
+        with pytest.raises(ConfigError) as refused:
+            load(None, own, None)
+        assert str(own) in str(refused.value)
+        assert "link.downlink = 'narrow'" in str(refused.value)
+        assert "what comes down it is channel.downlink = 'narrow'" in str(refused.value)
+    assert load_config(None, own, {"link": {"downlink": "zenoh"}}).link.downlink == "zenoh"
+
+
 def test_a_person_who_sets_fields_of_the_narrow_downlink_for_another_is_warned(tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
     own.write_text('preset = "tuned-10baud"\n[downlink]\nbits = 8\n')
-    with pytest.warns(UserWarning, match=r'^channel\.downlink_baud, downlink\.bits: .* = "full": set'):
+    with pytest.warns(
+        UserWarning, match=r'^channel\.downlink_baud, downlink\.bits: .* = "full": set'
+    ) as found:
         config = flight_config(None, own, {"channel": {"downlink_baud": 10.0}})
+    assert found[0].filename == __file__
     own.write_text(dump_config(config))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -222,10 +239,6 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
             {"downlink__scheme": "coded", "downlink__bits": 8},
             r'downlink\.bits: only for the scheme "mirrored"; .* set downlink\.scheme = "mirrored"',
         ),
-        (
-            {"link__downlink": "narrow"},
-            r"link of the commands; what comes down it is channel\.downlink = 'narrow'",
-        ),
         ({"timing__lead_ticks": 7, "downlink__scheme": "coded"}, "need lead_ticks >= 8"),
         ({"downlink__scheme": "coded", "downlink__directions": [[1.0]]}, r"1 row\(s\) of 1 numbers"),
         ({"downlink__scheme": "coded", "downlink__feedback": [[1.0]]}, r"downlink\.feedback has 1 row"),
@@ -266,7 +279,8 @@ def test_what_cannot_be_flown_is_refused_with_the_numbers(changes: dict[str, Any
 
 def test_a_recorded_flight_keeps_its_settings_without_effect() -> None:
     changes = {"channel": {"downlink": "narrow"}, "downlink": {"range_max": 0.7}}
-    config = load_config("tuned-10baud", None, changes | {"link": {"downlink": "narrow"}})
+    changes |= {"link": {"downlink": "narrow"}}
+    config = load_config("tuned-10baud", None, changes, recorded=True)
     assert agree_again(config, "virtual", allow_code=False).identity == agreed().identity
 
 

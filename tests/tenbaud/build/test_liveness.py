@@ -134,12 +134,13 @@ def assert_comes_back(seed: int) -> bool:
 
 
 def test_when_a_configuration_is_accepted_then_lockstep_comes_back() -> None:
-    assert sum(assert_comes_back(seed) for seed in range(8)) >= 3
+    # One that is refused, the longest round trip, no delay at all, and a cut.
+    assert sum(assert_comes_back(seed) for seed in (1, 3, 4, 7)) >= 3
 
 
 @pytest.mark.soak
 def test_when_any_configuration_is_accepted_then_lockstep_comes_back() -> None:
-    assert sum(assert_comes_back(seed) for seed in range(1000, 1400)) >= 100
+    assert sum(assert_comes_back(seed) for seed in (*range(8), *range(1000, 1400))) >= 100
 
 
 def test_when_the_watchdog_is_automatic_then_it_knows_lead_and_round_trip() -> None:

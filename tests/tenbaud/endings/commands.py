@@ -73,7 +73,7 @@ WRITERS: dict[str, Arguments] = {
     "convert json": lambda inputs, out: ["convert", inputs.run, "--to", "json", "--out", out],
     "convert mcap": lambda inputs, out: ["convert", inputs.run, "--to", "mcap", "--out", out],
     "identify": lambda _, out: [
-        *("identify", "--excitation", "square:0.2,0,2.5", "--duration", "30", "--figure", "--out", out),
+        *("identify", "--excitation", "square:0.2,0,2.5", "--duration", "12", "--figure", "--out", out),
     ],
     "compare figure": lambda inputs, out: [
         *("compare", inputs.run, inputs.run, "--figure", f"{out}.png"),

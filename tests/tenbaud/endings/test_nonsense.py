@@ -139,7 +139,9 @@ def test_when_every_sentence_is_nonsense_then_the_audit_is_as_before(
     assert Run(tmp_path / "after").events[0]["text"] == nonsense.NONSENSE
 
 
-@pytest.mark.parametrize("scenario", ["over", "desync", "refused"])
+@pytest.mark.parametrize(
+    "scenario", ["over", "desync", pytest.param("refused", marks=pytest.mark.soak)]
+)
 def test_when_two_processes_say_nothing_but_nonsense_then_their_exit_codes_are_as_before(
     scenario: str, tmp_path: Path
 ) -> None:

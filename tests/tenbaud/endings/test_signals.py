@@ -24,7 +24,7 @@ from tests.tenbaud.processes import REPOSITORY, Ended, finish, start
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 PATIENCE_S = 240.0
-FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--figure", "--out", "run")
+FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--out", "run")
 
 
 def _wait_for(met: Callable[[], bool]) -> None:
@@ -84,7 +84,7 @@ leave(130)
     ],
 )
 def test_a_demo_ends_with_all_its_processes(stage: str, number: int, tmp_path: Path) -> None:
-    process = start(*FLIGHT, cwd=tmp_path)
+    process = start(*FLIGHT, "--figure", cwd=tmp_path)
     time.sleep(0.15)
     _wait_for(lambda: STAGES[stage](tmp_path))
     process.send_signal(number)

@@ -74,8 +74,23 @@ def test_a_reader_that_went_away_is_said(name: str, inputs: Inputs, tmp_path: Pa
         assert "standard output cannot be written: Broken pipe" in err
 
 
-@pytest.mark.parametrize("redirections", [">&-", "2>&-", ">&- 2>&- <&-", "2>/dev/full"])
-@pytest.mark.parametrize("name", FORMS)
+CLOSED = (">&- 2>&- <&-", ">&-", "2>&-", "2>/dev/full")
+EACH_CLOSED = [
+    pytest.param(
+        name,
+        redirections,
+        id=f"{name}-{redirections}",
+        marks=()
+        if name == ORDINARY[0] or (name, redirections) == (ORDINARY[1], CLOSED[0])
+        else pytest.mark.soak,
+    )
+    for name in TALKERS
+    for redirections in CLOSED
+]
+"""The flight with each, a short command with all that can be closed; the others under `make soak`."""
+
+
+@pytest.mark.parametrize(("name", "redirections"), EACH_CLOSED)
 def test_closed_streams_change_nothing(
     name: str, redirections: str, inputs: Inputs, tmp_path: Path
 ) -> None:

@@ -77,7 +77,10 @@ def line_of(chance: random.Random, agreement: Agreement) -> bytes:
     return bytes(found)
 
 
-@pytest.mark.parametrize("preset", ["paper-10baud", "history-10baud", "pendulum-20baud"])
+@pytest.mark.parametrize(
+    "preset",
+    ["paper-10baud", "pendulum-20baud", pytest.param("history-10baud", marks=pytest.mark.soak)],
+)
 def test_no_frame_leads_the_node_out_of_its_memory(preset: str, tmp_path: Path) -> None:
     need("gcc", "gcc")
     settings: dict[str, Any] = {"link": {"kind": "serial"}}

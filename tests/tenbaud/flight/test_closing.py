@@ -10,6 +10,7 @@ import pytest
 from tenbaud.flight.report import closing_lines
 from tenbaud.recording.folder import RunFolder
 from tenbaud.sentences.flown import warnings_of
+from tests.tenbaud.flown import flown
 
 FLOWN: dict[str, Any] = {
     "preset": "tuned-10baud",
@@ -161,6 +162,15 @@ def test_what_went_wrong_is_said_right_below_the_verdict(
 def test_ticks_without_a_command_of_a_narrow_flight_are_not_put_down_to_late_ones() -> None:
     (said,) = warnings_of(FLOWN | {"commands_late": 194, "downlink": "narrow"})
     assert said == "no command for 194 ticks, so the last one was held (too little was certain)"
+
+
+def test_a_narrow_flight_that_was_too_short_to_be_certain_of_a_sample_says_nothing_of_its_slots(
+    tmp_path: Path,
+) -> None:
+    summary = flown(tmp_path / "run", duration_s=0.9, channel__downlink="narrow").summary
+    assert summary["narrow"]["samples_confirmed"] == 0
+    assert summary["symbols_missing_share"] is None
+    assert not any("of the slots" in said for said in warnings_of(summary))
 
 
 def test_a_terminal_without_unicode_gets_plain_characters(tmp_path: Path) -> None:

@@ -188,7 +188,7 @@ def test_a_recording_of_another_version_is_said_to_be_one_and_read(tmp_path: Pat
         assert words in told.out + told.err
 
 
-@pytest.mark.parametrize("inputs", [300, pytest.param(100_000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("inputs", [150, pytest.param(100_000, marks=pytest.mark.soak)])
 def test_only_errors_of_ours_come_out_of_the_readers(tmp_path: Path, inputs: int) -> None:
     run = flown(
         tmp_path / "run",

@@ -28,6 +28,7 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
+from tenbaud.studies import machine_code
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.compiled import arrays_of, compiled, whole_of
 from tenbaud.studies.flights import CompiledPoint
@@ -115,12 +116,12 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
     remembered = (compiling.compiled, compiling.reader, compiling.whole_of, compiling.states_read)
 
     def forget() -> None:
-        monkeypatch.setattr(compiling, "_cache_folder", lambda: None)
+        monkeypatch.setattr(machine_code, "cache_folder", lambda: None)
         for one in remembered:
             one.cache_clear()
 
     yield forget
-    if compiling._cache_folder() is None:
+    if machine_code.cache_folder() is None:
         for one in remembered:
             one.cache_clear()
 

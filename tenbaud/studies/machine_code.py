@@ -134,8 +134,8 @@ def prune(base: Path) -> None:
 def make_ready(function: Any, *arguments: Any) -> None:
     """Compile a function for arguments of these types, or read what has been kept.
 
-    Garbage is collected afterwards: numba makes so many objects that looking through them while they
-    grow takes a tenth of the time.
+    Garbage is collected afterwards: numba makes objects by the million, and looking through them while
+    they grow takes a tenth of the time.
     """
     types = tuple(map(import_module("numba").typeof, arguments))
     if types in function.overloads:

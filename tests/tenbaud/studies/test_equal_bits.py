@@ -42,7 +42,7 @@ from transmitter.session.records import SAMPLE_CHANNEL
 PRESETS = ("paper-10baud", "tuned-20baud", "usual-1000baud", "linear")
 """Flown whole, compiled, under every line: three flights to compile."""
 BY_PART = ("open-loop-zoom-10baud", "static-10baud", "history-10baud", "pendulum-30baud", "learning")
-"""Their functions are compiled, which takes a fifth of the time; the long tests fly them whole."""
+"""Their functions are compiled, which takes a third of the time; the long tests fly them whole."""
 LINEAR = {
     **SUM_OF_STATES,
     "states": ["pitch", "pitch_rate", "drift"],
@@ -161,7 +161,11 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
     compare(point)
 
 
-@pytest.mark.parametrize("preset", BY_PART)
+@pytest.mark.parametrize(
+    "preset",
+    # Those of `history` are compared in the tests of this coder, and in a flight below.
+    [pytest.param(one, marks=pytest.mark.soak if one == "history-10baud" else ()) for one in BY_PART],
+)
 def test_when_the_functions_of_a_codec_are_compiled_then_no_bit_differs(preset: str) -> None:
     learns = preset == "learning"
     changes = learning() if learns else FLOOR if preset == "history-10baud" else {}

@@ -41,7 +41,10 @@ def test_when_the_plant_is_pushed_then_the_density_is_found(preset: str, density
     assert summary["disturbance_density"] == pytest.approx(density, rel=0.35)
 
 
-@pytest.mark.parametrize(("plant", "rate"), [("helicopter", 33), ("furuta", 50), ("heading", 5)])
+@pytest.mark.parametrize(
+    ("plant", "rate"),
+    [pytest.param("helicopter", 33, marks=pytest.mark.soak), ("furuta", 50), ("heading", 5)],
+)
 def test_any_linear_plant_has_its_density_found_and_its_error_over_the_floor(
     plant: str, rate: int
 ) -> None:

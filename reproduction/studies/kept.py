@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from tenbaud.files.whole import write_whole
-from tenbaud.studies.compiled import sources_digest
+from tenbaud.studies.machine_code import sources_digest
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from tenbaud.config.schema import FlightConfig
-from tenbaud.studies.compiled import sources_digest
 from tenbaud.studies.figures import FlightFigures
+from tenbaud.studies.machine_code import sources_digest
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study import Study
 

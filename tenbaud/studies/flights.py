@@ -30,11 +30,12 @@ from tenbaud.studies.arrays import (
     targets_of,
     work_arrays,
 )
-from tenbaud.studies.compiled import arrays_of, compiled, reader, states_read, whole_of
+from tenbaud.studies.compiled import arrays_of, compiled, part, reader, states_read, whole_of
 from tenbaud.studies.figures import FlightFigures, OutputFigures, shared_parts
 from tenbaud.studies.flight_data import Given, Numbers, Work
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.laws import law_of
+from tenbaud.studies.machine_code import make_ready
 from tenbaud.studies.plants import AtRest, PlantParts, plant_parts
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import window_ticks
@@ -49,6 +50,7 @@ class CompiledPoint:
 
     _log: FlightLog | None = None
     _clean: Any = None
+    _ready = False
 
     def __init__(self, config: FlightConfig, scored_from: int | None = None) -> None:
         """Build all that does not depend on the seed."""
@@ -121,8 +123,12 @@ class CompiledPoint:
         work = self._work
         if schedule.longest_late > self._timeout_ticks:
             raise Uncommon("a flight whose guard steps in")
+        arguments = (self.numbers, self.constants, self.given(schedule, agreement), work)
+        if not self._ready:
+            make_ready(self._flight, *arguments)
+            self._ready = True
         try:
-            kept = self._flight(self.numbers, self.constants, self.given(schedule, agreement), work)
+            kept = self._flight(*arguments)
         except ValueError as error:
             raise Uncommon(str(error)) from error
         if not kept:
@@ -229,11 +235,11 @@ def compiled_flight(codec: Codec, signals: Signals, law: Any, plant: PlantParts,
     parts = (
         ("INPUTS", inputs),
         ("OUTPUTS", outputs),
-        ("tick", whole_of(row) if row else compiled(codec.model.tick_function)),  # type: ignore[attr-defined]
-        ("output_of", compiled(output) if output else states_read(signals.output_states)),
-        ("encode", compiled(encode, allocates=allocates)),
-        ("decode", compiled(decode, allocates=allocates)),
-        ("law", compiled(law, (("INPUTS", inputs),))),
+        ("tick", whole_of(row, True) if row else part(codec.model.tick_function)),  # type: ignore[attr-defined]
+        ("output_of", part(output) if output else states_read(signals.output_states)),
+        ("encode", part(encode, allocates=allocates, inlined=not allocates)),
+        ("decode", part(decode, allocates=allocates, inlined=not allocates)),
+        ("law", part(law, (("INPUTS", inputs),))),
         ("state_of", reader(codec.model.state_size)),
         ("held_of", reader(codec.model.correction_size)),
         ("command_of", reader(inputs)),
@@ -241,7 +247,7 @@ def compiled_flight(codec: Codec, signals: Signals, law: Any, plant: PlantParts,
         ("push_of", reader(places)),
         ("plant_step", plant.step),
         ("plant_output", plant.output),
-        ("sine", compiled(sin)),
+        ("sine", part(sin)),
     )
     return compiled(fly, parts)
 

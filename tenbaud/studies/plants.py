@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plant_sim.ode import OdePlant, ode_step
-from tenbaud.studies.compiled import arrays_of, compiled, named, reader, states_read, whole_of
+from tenbaud.studies.compiled import arrays_of, named, part, reader, states_read, whole_of
 from tenbaud.studies.schedule import Uncommon
 
 
@@ -48,12 +48,12 @@ def plant_parts(plant: Any, outputs: int) -> PlantParts:
         start = (*plant.state, *plant.motors)
         of = pair_reader(len(plant.state), len(plant.motors))
         step = plant_step_of(plant.slopes)
-        return PlantParts(step, compiled(first_output), of, start, plant.step_constants)
+        return PlantParts(step, part(first_output), of, start, plant.step_constants)
     of = reader(len(getattr(plant, "state", ())))
     if hasattr(plant, "step_function"):
-        return PlantParts(compiled(plant.step_function), first, of, plant.state, plant.constants)
+        return PlantParts(part(plant.step_function), first, of, plant.state, plant.constants)
     if hasattr(plant, "row_function"):
-        step, output = plant_row_step_of(plant.row_function), compiled(plant.output_function)
+        step, output = plant_row_step_of(plant.row_function), part(plant.output_function)
         return PlantParts(step, output, of, plant.state, arrays_of(plant.constants))
     raise Uncommon("a plant that is not written as functions")
 
@@ -61,7 +61,7 @@ def plant_parts(plant: Any, outputs: int) -> PlantParts:
 @cache
 def plant_step_of(slopes: Callable[..., Any]) -> Any:
     """Return the compiled step of a plant of these equations (`plant_sim.ode`)."""
-    step, equations = compiled(ode_step), compiled(slopes)
+    step, equations = part(ode_step), part(slopes)
 
     def plant_step(state: Any, command: Any, push: Any, constants: Any, sine: Any) -> Any:
         return step(equations, state, command, push, constants, sine)
@@ -72,7 +72,7 @@ def plant_step_of(slopes: Callable[..., Any]) -> Any:
 @cache
 def plant_row_step_of(row_function: Callable[..., float]) -> Any:
     """Return the compiled step of a plant that is written row by row."""
-    whole = whole_of(row_function)
+    whole = whole_of(row_function, True)
 
     def plant_step(state: Any, command: Any, push: Any, constants: Any, sine: Any) -> Any:
         return whole(state, command, push, constants)

@@ -82,9 +82,11 @@ def guess(
     known = given.known[sample * numbers.per_sample]
     commands = known * numbers.per_sample + numbers.lead
     good = True
+    # A variable, as elsewhere: for the constant, `decode` would be compiled once more.
+    erased = sample < known
     for one in range(known, sample):
         word = work.sent[one * size : (one + 1) * size]
-        decode(coder_constants, work.coder, work.model, word, False, work.correction, work.spare)
+        decode(coder_constants, work.coder, work.model, word, erased, work.correction, work.spare)
         put(work.spare, work.coder)
         if numbers.impulse:
             add_correction(work.model, work.correction)

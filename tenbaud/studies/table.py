@@ -11,8 +11,9 @@ from typing import Any
 
 from tenbaud.files.whole import make_folder, whole_file
 from tenbaud.studies.chunk import ChunkResult
-from tenbaud.studies.compiled import require, sources_digest
+from tenbaud.studies.compiled import require
 from tenbaud.studies.figures import FlightFigures, OutputFigures
+from tenbaud.studies.machine_code import sources_digest
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study import Study
 

@@ -28,6 +28,7 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
+from tenbaud.studies import machine_code
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.compiled import arrays_of, compiled, whole_of
 from tenbaud.studies.flights import CompiledPoint
@@ -41,7 +42,7 @@ from transmitter.session.records import SAMPLE_CHANNEL
 PRESETS = ("paper-10baud", "tuned-20baud", "usual-1000baud", "linear")
 """Flown whole, compiled, under every line: three flights to compile."""
 BY_PART = ("open-loop-zoom-10baud", "static-10baud", "history-10baud", "pendulum-30baud", "learning")
-"""Their functions are compiled, which takes a fifth of the time; the long tests fly them whole."""
+"""Their functions are compiled, which takes a third of the time; the long tests fly them whole."""
 LINEAR = {
     **SUM_OF_STATES,
     "states": ["pitch", "pitch_rate", "drift"],
@@ -115,12 +116,12 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
     remembered = (compiling.compiled, compiling.reader, compiling.whole_of, compiling.states_read)
 
     def forget() -> None:
-        monkeypatch.setattr(compiling, "_cache_folder", lambda: None)
+        monkeypatch.setattr(machine_code, "cache_folder", lambda: None)
         for one in remembered:
             one.cache_clear()
 
     yield forget
-    if compiling._cache_folder() is None:
+    if machine_code.cache_folder() is None:
         for one in remembered:
             one.cache_clear()
 
@@ -160,7 +161,11 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
     compare(point)
 
 
-@pytest.mark.parametrize("preset", BY_PART)
+@pytest.mark.parametrize(
+    "preset",
+    # Those of `history` are compared in the tests of this coder, and in a flight below.
+    [pytest.param(one, marks=pytest.mark.soak if one == "history-10baud" else ()) for one in BY_PART],
+)
 def test_when_the_functions_of_a_codec_are_compiled_then_no_bit_differs(preset: str) -> None:
     learns = preset == "learning"
     changes = learning() if learns else FLOOR if preset == "history-10baud" else {}

@@ -50,7 +50,9 @@ def overlapping(axis: Any) -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.parametrize("decades", [0.1, 0.6, 1.5, 2.5, 4.5, 6.0])
+@pytest.mark.parametrize(
+    "decades", [0.1, 1.5, 6.0, *(pytest.param(one, marks=pytest.mark.soak) for one in (0.6, 2.5, 4.5))]
+)
 def test_when_errors_span_many_decades_then_labels_do_not_touch(
     figures: dict[str, Any], tmp_path: Path, decades: float
 ) -> None:

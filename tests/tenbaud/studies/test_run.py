@@ -167,7 +167,7 @@ def test_when_no_scheduler_answers_then_the_error_says_where(tmp_path: Path) -> 
 
 
 def test_when_a_cluster_loses_a_worker_in_flight_then_nothing_is_lost(tmp_path: Path) -> None:
-    study = study_of(seeds=30)
+    study = study_of(seeds=12)
     expected = flown(study, tmp_path / "one")
     address = free_endpoint().replace("tcp/", "tcp://")
     with cluster(address, tmp_path) as workers:

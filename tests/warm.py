@@ -53,6 +53,8 @@ REQUEST_BYTES_MAX = 1 << 20
 NAME_BYTES_MAX = 4096
 READ_AT_START = ("PYTHON", "LANG", "LC_", "OMP_", "OPENBLAS_")
 """Variables of these names count before anything is imported: a copy has those of its original."""
+AS_IN_COPIES = {"PYTHONIOENCODING": "utf-8"}
+"""What each copy's streams are, whatever its original has."""
 
 
 class Popen(subprocess.Popen):  # type: ignore[type-arg]
@@ -101,7 +103,8 @@ def _is_same(folder: str, environment: Any) -> bool:
 
 def _at_start(environment: Any) -> dict[str, str]:
     names = [name for name in environment if name.startswith(READ_AT_START) and name != "PYTHONPATH"]
-    return {name: environment[name] for name in names}
+    found = {name: environment[name] for name in names}
+    return dict(found.items() - AS_IN_COPIES.items())
 
 
 class Server:

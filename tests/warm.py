@@ -39,7 +39,10 @@ IMPORTED = (
     *("tenbaud.flight.screen", "channel.links.zenoh.link", "zenoh", "numpy"),
     *("scipy.linalg", "scipy.optimize"),
 )
-PAGE = ("nicegui", "uvicorn", "tenbaud.view.page", "tenbaud.view.server")
+PAGE = (
+    *("nicegui", "uvicorn", "uvicorn.protocols.websockets.wsproto_impl", "anyio._backends._asyncio"),
+    *("tenbaud.view.page", "tenbaud.view.server", "tenbaud.view.gate", "tenbaud.view.replay"),
+)
 """Imported before the first copy that serves a page; most workers of a run make none."""
 SERVES_PAGE = ("view", "--view")
 STARTS_OTHERS = ("demo", "figures")

@@ -193,7 +193,7 @@ def test_when_a_flight_is_watched_and_could_be_steered_then_it_is_the_same_fligh
 def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_down(
     tmp_path: Path,
 ) -> None:
-    flight = ("--duration", "300", "--pace", "4")
+    flight = ("--duration", "90", "--pace", "1")
     how = ("--clock", "virtual", "--allow-control")
     with watched(tmp_path, *how, transmitter=flight) as pair:
         pair.wait(lambda: pair.newest("receiver"))

@@ -203,28 +203,26 @@ def test_who_may_only_look_sees_the_flight_and_has_nothing_to_press(own: Any, fl
 
 
 def test_when_the_page_is_opened_without_its_secret_then_it_says_what_to_do(
-    chromium: Any, flight: Served
+    tab: Any, flight: Served
 ) -> None:
-    page = chromium.new_page()
-    answer = page.goto(f"http://127.0.0.1:{flight.port}/")
+    tab.context.clear_cookies()
+    answer = tab.goto(f"http://127.0.0.1:{flight.port}/")
     assert answer.status == 403
-    assert "the whole address" in page.inner_text("body")
-    page.close()
+    assert "the whole address" in tab.inner_text("body")
 
 
 def test_when_the_server_was_started_anew_then_the_old_page_shows_nothing_and_says_so(
-    chromium: Any, tmp_path: Path
+    tab: Any, tmp_path: Path
 ) -> None:
     nowhere = f"unixsock-stream/{tmp_path}/nobody.sock"
-    page = chromium.new_page()
+    tab.context.clear_cookies()
     with served(tmp_path, "view", "--port", "0", "--connect", nowhere) as first:
         port = first.port
-        page.goto(first.url)
-        page.get_by_text("No flight found. Start one").wait_for()
+        tab.goto(first.url)
+        tab.get_by_text("No flight found. Start one").wait_for()
     with served(tmp_path, "view", "--port", str(port), "--connect", nowhere) as second:
-        answer = page.goto(page.url)
+        answer = tab.goto(tab.url)
         assert answer.status == 403
-        assert "Each start prints a new one" in page.inner_text("body")
-        page.goto(second.url)
-        page.get_by_text("No flight found. Start one").wait_for()
-    page.close()
+        assert "Each start prints a new one" in tab.inner_text("body")
+        tab.goto(second.url)
+        tab.get_by_text("No flight found. Start one").wait_for()

@@ -281,6 +281,7 @@ def test_when_the_flight_falls_silent_or_ends_then_it_says_so(tab: Any, tmp_path
         one.process.send_signal(signal.SIGINT)
         page.get_by_text("The flight is over").first.wait_for()
         one.process.wait(240.0)
+        page.goto("about:blank")
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["outcome"] == "stopped by the user"
     assert summary["duration_s"] > 0.0

@@ -292,10 +292,11 @@ def test_the_stream_closes_on_what_is_no_question(open_page: Any, one_run: Serve
 
 
 def test_one_address_is_printed_and_nothing_is_served_without_its_secret(
-    one_run: Served, chromium: Any, tmp_path: Path
+    one_run: Served, tabs: Callable[[bool], Any]
 ) -> None:
     assert one_run.look_url == ""
-    page = chromium.new_page()
+    page = tabs(False)
+    page.context.clear_cookies()
     answer = page.goto(one_run.url.partition("?")[0])
     assert answer.status == 403
-    page.close()
+    page.goto("about:blank")

@@ -144,7 +144,8 @@ def test_when_flown_on_every_clock_and_link_then_the_states_are_identical_and_te
         if name == "real":
             assert ended.summary["loop_late_ms_p99"] is not None
             need_idle(ended.summary)
-            assert ended.summary["baud_measured"] == pytest.approx(10.0, abs=0.1)
+            # 50 ms of three seconds: the first or the last symbol may be held up.
+            assert ended.summary["baud_measured"] == pytest.approx(10.0, abs=0.17)
     for other in ("virtual", "memory"):
         compared = compare_runs(tmp_path / "real", tmp_path / other)
         assert compared.verdict is Verdict.EQUAL, f"real and {other}: {compared}"

@@ -78,7 +78,8 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
     assert carried >= 60
     endpoint = flown.transmitter.endpoint
     assert endpoint.inlet.meter.symbols >= 58  # the last ones may come after the end
-    assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
+    # A symbol that is held up for an eighth of a second at either end changes it by so much.
+    assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.8)
 
 
 @pytest.mark.real_time
@@ -96,10 +97,11 @@ def test_when_bytes_are_damaged_and_the_plug_is_out_then_no_wrong_state_is_confi
             time.sleep(0.4)
             line.plug()
 
-        flown = fly(line, {**narrow_settings(), "duration_s": 8.0}, disturb)
+        flown = fly(line, {**narrow_settings(), "duration_s": 14.0}, disturb, stop_at=50)
         assert line.damaged["down"] > 0
     # On a busy machine fewer samples are confirmed than a flight needs to be called flown.
-    assert flown.outcome.code in (ExitCode.OK, ExitCode.NOT_FLOWN), flown.outcome.text
+    usual = (ExitCode.INTERRUPTED, ExitCode.OK, ExitCode.NOT_FLOWN)
+    assert flown.outcome.code in usual, flown.outcome.text
     assert flown.sent.column("sample", "sample")[-1] > 40, "nothing was confirmed after the plug was in"
     check_equal_where_confirmed(flown)
     assert flown.reconnects == 2

@@ -83,8 +83,8 @@ def test_when_make_demo_is_typed_then_a_flight_and_its_figure_are_there(
 def test_when_make_demo_is_typed_in_a_bare_copy_then_it_installs_what_flying_needs_and_no_more(
     tmp_path: Path,
 ) -> None:
-    top = tmp_path / "tenbaud"
-    copy_repository(top, Ports(), short=False)
+    top, ports = tmp_path / "tenbaud", Ports()  # it holds the free ports until the end
+    copy_repository(top, ports, short=False)
     left_out = ("PYTHONPATH", "VIRTUAL_ENV", "PYTEST_ADDOPTS", "TENBAUD_FIGURE")
     environment = {name: value for name, value in os.environ.items() if name not in left_out}
     command = ["make", "demo"]

@@ -16,7 +16,7 @@ from tests.simulation.intruded import IntrudedWorld, Intrusion, draw_intrusion
 from tests.simulation.soak import fly_intruded_seed
 
 SEEDS, FLOWN = 16, (1, 2, 5)
-"""`make soak` flies them all, and random ones. Those flown here have forged frames and a second
+"""`make soak` flies the others, and random ones. Those flown here have forged frames and a second
 receiver; in two a recording is played back, in one the transmitter is killed."""
 SECOND = 1_000_000_000
 

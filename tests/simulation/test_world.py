@@ -16,8 +16,8 @@ from transmitter.session.owing import Owing
 from transmitter.session.session import TransmitterSession
 
 SEEDS, FLOWN = 24, (0, 1, 2, 3)
-"""`make soak` flies them all, and random ones. Of those flown here one has a long lead and a clock that
-jumps, one twenty rejoins; either end is killed, and the line cut in each direction and in both."""
+"""`make soak` flies the others, and random ones. Of those flown here one has a long lead and a clock
+that jumps, one twenty rejoins; either end is killed, and the line cut in each direction and in both."""
 
 
 @pytest.mark.parametrize(

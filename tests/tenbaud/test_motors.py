@@ -34,7 +34,7 @@ def test_the_printed_command_flies_gently(arguments: tuple[str, ...], tmp_path: 
         words = shlex.split(printed.partition("fly it with: tenbaud ")[2])
         assert words[0] == "demo"
         assert "--yes" in words
-        given = (*PATIENT, "--duration", "1", "--json", "--no-figure", "--out", "run")
+        given = (*PATIENT, "--duration", "3", "--json", "--no-figure", "--out", "run")
         flown = subprocess.run(
             [*TENBAUD, *words, *given],
             cwd=tmp_path,

@@ -63,7 +63,7 @@ def fly(
     """Fly both ends over a line on the real clock, the receiver on a separate thread.
 
     `meanwhile` runs on another thread once the flight has begun. With `stop_at` the flight is stopped
-    when this sample or a later one is confirmed.
+    when this sample or a later one is confirmed and `meanwhile` has returned.
     """
     config = load_config("paper-10baud", None, overrides)
     agreement = agree(config, "real")
@@ -87,7 +87,9 @@ def fly(
         run_up = transmit.prepare(agreement, sent, upper.wire)
 
         def should_stop() -> bool:
-            return stop_at is not None and max(sent.column("sample", "sample"), default=-1) >= stop_at
+            if stop_at is None or intruder.is_alive():
+                return False
+            return max(sent.column("sample", "sample"), default=-1) >= stop_at
 
         def interfere() -> None:
             while not over.is_set() and run_up.node.tick < 100:

@@ -141,7 +141,7 @@ def stop(receiver: subprocess.Popen[str]) -> None:
     finish(receiver)
 
 
-def test_the_emulated_board_flies_in_real_time_and_every_digest_is_equal(
+def test_the_emulated_board_flies_with_a_receiver_and_every_digest_is_equal(
     image: Path, tmp_path: Path
 ) -> None:
     with powered(image, tmp_path) as board:

@@ -163,7 +163,7 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
 
 @pytest.mark.parametrize(
     "preset",
-    # Those of `history` are compared in the tests of this coder, and in a flight below.
+    # Those of `history` are compared in `tests/channel/codec/coders/test_history.py`.
     [pytest.param(one, marks=pytest.mark.soak if one == "history-10baud" else ()) for one in BY_PART],
 )
 def test_when_the_functions_of_a_codec_are_compiled_then_no_bit_differs(preset: str) -> None:

@@ -136,10 +136,13 @@ def results(encode, decode, constants, coder, measurement):  # type: ignore[no-u
     import numpy
 
     symbols = numpy.zeros(1, dtype=numpy.int64)
-    correction, after = numpy.zeros(2), numpy.zeros(len(coder))
     encode(constants, coder, numpy.zeros(2), measurement, symbols)
-    decode(constants, coder, numpy.zeros(4), symbols, False, correction, after)
-    return int(symbols[0]), [value.hex() for value in (*correction.tolist(), *after.tolist())]
+    numbers = []
+    for erased in (False, True):
+        correction, after = numpy.zeros(2), numpy.zeros(len(coder))
+        decode(constants, coder, numpy.zeros(4), symbols, erased, correction, after)
+        numbers += [*correction.tolist(), *after.tolist()]
+    return int(symbols[0]), [value.hex() for value in numbers]
 
 
 def test_when_the_floor_has_no_gain_then_there_is_no_more_state() -> None:

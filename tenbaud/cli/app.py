@@ -59,6 +59,11 @@ def run(arguments: list[str]) -> int:
         what = f"{_shown(error.filename)}: " if error.filename is not None else ""
         _say(f"{what}{_reason(error)}")
         code = int(ExitCode.NOT_WRITTEN if error.errno in NOT_WRITABLE else ExitCode.USAGE)
+    except RuntimeError as error:
+        # An interrupt during an import, in `__set_name__`, comes out as one.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        code = int(ExitCode.INTERRUPTED)
     else:
         code = 0
     if interruptions.received is not None:

@@ -16,6 +16,8 @@ def main() -> None:
     """Run the command line; errors become one message and an exit code."""
     # Until the imports below are done, some tenths of a second, Ctrl-C ends this process as any other.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # The matrices here are small. With several threads the linear algebra mostly waits, by spinning.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tenbaud.cli.streams import leave, lost_output, prepare_streams
     from tenbaud.cli.waiting import begin
     from tenbaud.flight.lifeline import follow_parent

@@ -95,7 +95,7 @@ def fly_all(
 ) -> tuple[dict[str, Flown], dict[str, Any]]:
     """Fly every job and do every task, long ones first; return both by name.
 
-    Two are done at a time, each in a process of its own; a few short ones one by one in this process.
+    Two are done at a time, each by a worker process; a few short ones one by one in this process.
     """
     flights = [Task(job.name, fly, (job, folder), job.weight) for job in jobs]
     ordered = sorted([*flights, *tasks], key=lambda task: -task.weight)

@@ -65,8 +65,8 @@ LONGEST_FIRST = (
 """What takes or waits longest: started last, it would keep one worker busy and the others idle."""
 
 COMPILED_BEFORE = "[docs/howto/your-log.md]"
-"""A page that flies what those above compile: it begins after they have begun, and so finds most of
-their machine code; nothing makes it wait for them."""
+"""A page that flies what those above compile: it begins after they have begun, finds most of their
+machine code, and waits for the flight that one of them compiles then."""
 
 PAGES = "tests/docs/test_commands.py::test_when_a_page_is_typed_in_then"
 """On two workers, each with one process that has imported everything (`tests/docs/prepared.py`)."""

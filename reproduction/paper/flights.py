@@ -93,7 +93,10 @@ def fly_all(
     tasks: Iterable[Task] = (),
     on_done: Callable[[str, float], None] = lambda name, weight: None,
 ) -> tuple[dict[str, Flown], dict[str, Any]]:
-    """Fly every job and do every task, two at a time, long ones first; return both by name."""
+    """Fly every job and do every task, long ones first; return both by name.
+
+    Two are done at a time, each by a worker process; a few short ones one by one in this process.
+    """
     flights = [Task(job.name, fly, (job, folder), job.weight) for job in jobs]
     ordered = sorted([*flights, *tasks], key=lambda task: -task.weight)
     flown: dict[str, Flown] = {}

@@ -87,7 +87,7 @@ def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: i
     """Return one experiment on the paper's plant, resting at first."""
     model = load_config("paper-10baud").model
     rest = getattr(model, "equilibrium_rad", 0.0)
-    section = {"initial_angle_rad": rest, "disturbance": disturbance}
+    section = {"initial": rest, "disturbance": disturbance}
     config = load_config(
         "paper-10baud",
         None,

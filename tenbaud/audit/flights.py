@@ -99,9 +99,12 @@ def check_jitter(evidence: Evidence) -> None:
 def jittered(evidence: Evidence, controller: Controller, seed: int) -> list[Reflown]:
     """Return the flight, flown again with its symbols at other times within their deadlines."""
     noise, most_ns = random.Random(JITTER_SEED + seed), evidence.terms.deadline_allowance_ns
-    epochs = evidence.epochs
-    times = lambda _slot: noise.randint(0, most_ns)  # noqa: E731
-    return list(refly(evidence.agreement, controller, epochs, times, evidence.walk.again()))
+
+    def delay(_slot: int) -> int:
+        return noise.randint(0, most_ns)
+
+    again = evidence.walk.again()
+    return list(refly(evidence.agreement, controller, evidence.epochs, delay, again))
 
 
 def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before) -> bool:

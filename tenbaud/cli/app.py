@@ -16,6 +16,8 @@ def main() -> None:
     """Run the command line; errors become one message and an exit code."""
     # Until the imports below are done, some tenths of a second, Ctrl-C ends this process as any other.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # The matrices here are small. With several threads the linear algebra mostly waits, by spinning.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tenbaud.cli.streams import leave, lost_output, prepare_streams
     from tenbaud.cli.waiting import begin
     from tenbaud.flight.lifeline import follow_parent
@@ -59,6 +61,11 @@ def run(arguments: list[str]) -> int:
         what = f"{_shown(error.filename)}: " if error.filename is not None else ""
         _say(f"{what}{_reason(error)}")
         code = int(ExitCode.NOT_WRITTEN if error.errno in NOT_WRITABLE else ExitCode.USAGE)
+    except RuntimeError as error:
+        # An interrupt during an import, in `__set_name__`, comes out as one.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        code = int(ExitCode.INTERRUPTED)
     else:
         code = 0
     if interruptions.received is not None:

@@ -125,7 +125,7 @@ def _refuse_misplaced(values: Mapping[str, Any], source: str) -> None:
     if name in get_args(Rung):
         raise ConfigError(
             f"{source}, with the command line over it:\n  link.downlink = {name!r}: it names the link "
-            f"of the commands; what comes down it is channel.downlink = {name!r}"
+            f"that carries the commands; for this kind of downlink set channel.downlink = {name!r}"
         )
 
 

@@ -66,7 +66,7 @@ def plant_step_of(slopes: Callable[..., Any]) -> Any:
     def plant_step(state: Any, command: Any, push: Any, constants: Any, sine: Any) -> Any:
         return step(equations, state, command, push, constants, sine)
 
-    # Before it is optimised, a function that is an argument is an address in this process.
+    # It refers to another function by its place in memory, until it is part of a flight.
     return named(plant_step, f"step_{slopes.__name__}", keep=False)
 
 

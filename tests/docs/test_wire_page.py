@@ -71,7 +71,7 @@ def values(frame: Any) -> dict[str, Any]:
     """Return a frame's fields, those of its echoes beside each other."""
     found = asdict(frame)
     for index, echo in enumerate(found.pop("echoes", ())):
-        found |= {f"{name} {index}": value for name, value in echo.items()}
+        found |= {f"{name} {index}": value for name, value in echo._asdict().items()}
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import pty
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -16,6 +17,7 @@ from tenbaud.cli.app import run
 from tenbaud.cli.streams import KeptStream
 from tenbaud.cli.units import plain_arguments, plain_setting
 from tenbaud.recording.run import Run
+from tests.tenbaud.processes import REPOSITORY
 from tests.tenbaud.processes import run as run_command
 
 
@@ -157,3 +159,27 @@ def test_every_stream_of_a_command_ends_the_line(monkeypatch: pytest.MonkeyPatch
     sys.stdout.write("one")
     sys.stderr.write("two")
     assert ended == ["end", "end"]
+
+
+@pytest.mark.parametrize(("given", "used"), [(None, "1"), ("3", "3")])
+def test_a_command_computes_with_one_thread_unless_the_environment_says_otherwise(
+    given: str | None, used: str, tmp_path: Path
+) -> None:
+    code = """
+import os
+from tenbaud.cli import app
+app.run = lambda arguments: print(os.environ["OPENBLAS_NUM_THREADS"]) or 0
+app.main()
+"""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("OPENBLAS")}
+    if given is not None:
+        environment["OPENBLAS_NUM_THREADS"] = given
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=environment | {"PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ended.stdout == f"{used}\n"

@@ -43,6 +43,7 @@ def test_when_figure_7_is_asked_for_then_two_processes_fly_twice_and_it_is_drawn
     assert not (out / "REPRODUCTION.md").exists(), "one figure does not make the page"
 
 
+@pytest.mark.filterwarnings("error::FutureWarning")  # of old names in a configuration
 def test_when_figures_3_4_and_5_are_asked_for_then_nothing_is_flown(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert "0 flights" in run("3", "4", "5", "--out", str(out))

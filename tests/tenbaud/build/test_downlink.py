@@ -166,7 +166,7 @@ def test_a_kind_of_downlink_in_place_of_its_link_is_refused_as_the_file_is_loade
             load(None, own, None)
         assert str(own) in str(refused.value)
         assert "link.downlink = 'narrow'" in str(refused.value)
-        assert "what comes down it is channel.downlink = 'narrow'" in str(refused.value)
+        assert "for this kind of downlink set channel.downlink = 'narrow'" in str(refused.value)
     assert load_config(None, own, {"link": {"downlink": "zenoh"}}).link.downlink == "zenoh"
 
 

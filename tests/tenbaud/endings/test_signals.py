@@ -70,6 +70,22 @@ leave(130)
     assert finish(start(cwd=tmp_path, code=code)).code == ExitCode.INTERRUPTED
 
 
+def test_when_an_interrupt_comes_out_of_an_import_as_another_error_then_the_command_is_interrupted(
+    tmp_path: Path,
+) -> None:
+    code = """
+import sys
+from tenbaud.cli import app, commands
+class Interrupted:
+    def __set_name__(self, owner, name):
+        raise KeyboardInterrupt
+commands.app_for = lambda arguments: type("Imported", (), {"field": Interrupted()})
+sys.exit(app.run([]))
+"""
+    ended = finish(start(cwd=tmp_path, code=code))
+    assert (ended.code, ended.err) == (ExitCode.INTERRUPTED, "")
+
+
 @pytest.mark.parametrize(
     ("stage", "number"),
     [

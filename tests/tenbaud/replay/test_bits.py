@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import pytest
 
@@ -39,3 +40,20 @@ def test_equal_values_are_the_same(value: object) -> None:
 def test_nearly_equal_values_are_not(one: object, other: object) -> None:
     assert not is_same(one, other)
     assert not is_same(other, one)
+
+
+class Named(NamedTuple):
+    """The state of a coder, as one from outside may write it."""
+
+    gain: float
+    signs: tuple[int, ...]
+
+
+def test_named_tuples_are_compared_to_the_last_bit_too() -> None:
+    state = Named(0.1, (1, -1))
+    assert is_same(state, Named(0.1, (1, -1)))
+    assert is_same((state, 2), (Named(0.1, (1, -1)), 2))
+    assert not is_same(state, Named(math.nextafter(0.1, 1.0), (1, -1)))
+    assert not is_same(Named(0.0, ()), Named(-0.0, ()))
+    assert not is_same((Named(0.0, ()),), (Named(-0.0, ()),))
+    assert not is_same(state, (0.1, (1, -1)))

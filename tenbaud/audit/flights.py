@@ -61,6 +61,10 @@ def check_starts(evidence: Evidence) -> None:
         allowed = [terms.initial_command] if is_initial else []
         if before is not None:
             allowed.append(before.hold)
+        carried = before and _carried_on(evidence, epoch, before)
+        if carried is not None:
+            # The law of a narrow downlink goes on while no symbols come.
+            allowed.append(carried.hold)
         if allowed and has_receiver and epoch.hold not in allowed:
             detail = f"{epoch.hold}, not {' or '.join(map(str, allowed))}"
             place.leak("hold", "the command before it was another", detail)
@@ -113,10 +117,16 @@ def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before) -> bool:
     if machine is None:
         carried = carried_to(codec, before.state, epoch.start.sample, before.known, epoch.hold, 0)
         return epoch.start in (carried, carried._replace(coder=anew))
-    both = before.both
-    while both is not None and both.sample < epoch.start.sample:
-        both = machine.step(both, ERASED, (None,) * machine.commands_in(both)).state
+    both = _carried_on(evidence, epoch, before)
     return both is not None and epoch.two_way in (
         both,
         both._replace(codec=both.codec._replace(coder=anew)),
     )
+
+
+def _carried_on(evidence: Evidence, epoch: Epoch, before: _Before) -> TwoWayState | None:
+    """Return the state before an epoch, advanced to it without symbols; None for another downlink."""
+    machine, both = evidence.agreement.two_way, before.both
+    while machine is not None and both is not None and both.sample < epoch.start.sample:
+        both = machine.step(both, ERASED, (None,) * machine.commands_in(both)).state
+    return both

@@ -27,6 +27,16 @@ ROUGH = "loss=0.2,up:flip=0.05,delay=20ms±10ms,duplicate=0.1,cut=2s+2s"
         ("tuned-10baud", {"link__impairments": "burst=0.05/0.3,duplicate=0.2"}),
         ("tuned-10baud", {"link__impairments": "cut=1s+5s", "duration_s": 9.0}),
         ("tuned-10baud", {"link__impairments": "skew=200ppm"}),
+        (
+            "tuned-20baud",
+            {
+                "channel__downlink": "narrow",
+                "timing__lead_ticks": 0,
+                "link__impairments": "cut=5s+4s,loss=0.05,down:delay=120ms",
+                "duration_s": 12.0,
+                "seed": 0,
+            },
+        ),
         ("tuned-10baud", {"link__impairments": "step=50ms@3s"}),
         ("usual-1000baud", {"link__impairments": "loss=0.1,delay=20ms±10ms,cut=1s+0.5s"}),
         ("usual-1000baud", {"link__impairments": "loss=0.01,duplicate=0.2"}),

@@ -13,7 +13,6 @@ from benchmarks.codec import codec_figures
 from benchmarks.fastest import fastest_figures
 from benchmarks.figures import Figure, show, write
 from benchmarks.flights import (
-    FlightFailed,
     cold_start_figures,
     fly_figures,
     memory_figures,
@@ -61,7 +60,7 @@ def main(names: list[str]) -> int:
             try:
                 # One by one: what was measured before a flight failed is kept.
                 figures.extend(BENCHMARKS[name]())
-            except FlightFailed as failure:
+            except RuntimeError as failure:
                 failures.append(f"{name}: {failure}")
             progress.remove_task(task)
     show(figures)

@@ -84,6 +84,7 @@ def memory_figures(ticks: int = 1_000_000) -> list[Figure]:
                 endpoint,
                 "--duration",
                 str(duration_s),
+                "--no-figure",  # the library that draws it would be taken for growth
                 "--out",
                 "upper",
             ),

@@ -53,15 +53,17 @@ def check_starts(evidence: Evidence) -> None:
     for index, epoch in enumerate(evidence.epochs):
         place = evidence.at(evidence.record.consumer, "epoch", f"epoch {epoch.number}")
         is_initial = epoch.start == codec.initial()._replace(sample=epoch.start.sample)
+        carried: TwoWayState | None = None
         if not is_initial and (before is None or not has_receiver):
             place.gap("state", "it starts from a state whose past is not recorded here")
-        elif not is_initial and before is not None and not _is_carried(evidence, epoch, before):
-            what = "it starts from a state that does not follow from the one before it"
-            place.leak("state", what, f"sample {epoch.start.sample}")
+        elif not is_initial and before is not None:
+            carried = _carried_on(evidence, epoch, before)
+            if not _is_carried(evidence, epoch, before, carried):
+                what = "it starts from a state that does not follow from the one before it"
+                place.leak("state", what, f"sample {epoch.start.sample}")
         allowed = [terms.initial_command] if is_initial else []
         if before is not None:
             allowed.append(before.hold)
-        carried = before and _carried_on(evidence, epoch, before)
         if carried is not None:
             # The law of a narrow downlink goes on while no symbols come.
             allowed.append(carried.hold)
@@ -111,13 +113,12 @@ def jittered(evidence: Evidence, controller: Controller, seed: int) -> list[Refl
     return list(refly(evidence.agreement, controller, evidence.epochs, delay, again))
 
 
-def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before) -> bool:
+def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before, both: TwoWayState | None) -> bool:
     codec, machine = evidence.agreement.codec, evidence.agreement.two_way
     anew = codec.coder.initial()  # after a long pause the coder starts anew
     if machine is None:
         carried = carried_to(codec, before.state, epoch.start.sample, before.known, epoch.hold, 0)
         return epoch.start in (carried, carried._replace(coder=anew))
-    both = _carried_on(evidence, epoch, before)
     return both is not None and epoch.two_way in (
         both,
         both._replace(codec=both.codec._replace(coder=anew)),

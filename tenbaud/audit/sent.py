@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -40,13 +41,12 @@ def _slots_of_first_words(evidence: Evidence) -> set[int]:
     Until it comes the receiver assumes when the slots are, and a down symbol may find its slot begun.
     """
     terms, found = evidence.terms, set[int]()
-    taken = [row.slot for row in evidence.topic("receiver", "symbol") if row.taken]
+    taken = sorted(row.slot for row in evidence.topic("receiver", "symbol") if row.taken)
     for epoch in evidence.topic("receiver", "epoch"):
-        first = min(
-            (slot for slot in taken if slot >= epoch.sample * terms.symbols_per_word), default=-1
-        )
-        last_sample = first // terms.symbols_per_word
-        found |= set(range(epoch.sample * terms.down_symbols, (last_sample + 1) * terms.down_symbols))
+        place = bisect_left(taken, epoch.sample * terms.symbols_per_word)
+        if place < len(taken):
+            after = taken[place] // terms.symbols_per_word + 1
+            found |= set(range(epoch.sample * terms.down_symbols, after * terms.down_symbols))
     return found
 
 

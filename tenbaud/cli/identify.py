@@ -14,7 +14,7 @@ from tenbaud.cli.spread import spread
 from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
-    from tenbaud.identification.api import Request, Result
+    from tenbaud.identification.api import Result
 
 PRINTED_EVERY_S = 10.0
 
@@ -46,6 +46,8 @@ class MethodOptions:
     """Use only the transmitted data of a run: symbols and commands."""
     fly: Annotated[bool, typer.Option("--fly/--no-fly")] = True
     """Fly the record with the identified model."""
+    figure: Annotated[bool, typer.Option("--figure/--no-figure", envvar="TENBAUD_FIGURE")] = True
+    """Draw Figs. 3 and 4 or not."""
 
 
 @spread
@@ -55,7 +57,6 @@ def identify(
     method: MethodOptions,
     out: options.Out = None,
     json: options.AsJson = False,
-    draw: options.DrawIdentified = True,
 ) -> None:
     """Identify a plant, write a configuration that flies it, and Figs. 3 and 4.
 
@@ -89,16 +90,16 @@ def identify(
         raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks")
     sources = sources_of(loaded, method.source, request, method.excitation, duration)
     result = identify_sources(loaded, sources, request)
-    _write(result, out, request, json, draw)
+    _write(result, out, method, json)
     if not result.supported:
         raise typer.Exit(int(ExitCode.FAILED))
 
 
-def _write(result: Result, out: Path | None, request: Request, as_json: bool, draw: bool) -> None:
+def _write(result: Result, out: Path | None, method: MethodOptions, as_json: bool) -> None:
     from tenbaud.recording.folder import create_run_folder
 
     folder = create_run_folder(None, "identify", out)
-    result.save(folder, fly=request.fly, draw=draw)
+    result.save(folder, fly=method.fly, draw=method.figure)
     if as_json:
         options.print_json([one.summary() for one in result.each])
     else:

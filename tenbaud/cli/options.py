@@ -53,10 +53,6 @@ Verbose = Annotated[bool, typer.Option("--verbose", help="Also print every figur
 Draw = Annotated[
     bool, typer.Option("--figure/--no-figure", envvar="TENBAUD_FIGURE", help="Draw flight.png or not.")
 ]
-DrawIdentified = Annotated[
-    bool,
-    typer.Option("--figure/--no-figure", envvar="TENBAUD_FIGURE", help="Draw Figs. 3 and 4 or not."),
-]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

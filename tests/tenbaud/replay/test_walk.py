@@ -45,20 +45,25 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[Word]:
     return words
 
 
+def noting(asked: list[int], decide: Decide) -> Decide:
+    """Return what decides in this way, and notes for which ticks it was asked."""
+
+    def ask(tick: int, live: Vector) -> Vector:
+        asked.append(tick)
+        return decide(tick, live)
+
+    return ask
+
+
 def test_what_is_asked_again_is_not_computed_again(computed: list[Word]) -> None:
     first = Walk()
     flown = first.first(CODEC, START, WORD, KNOWN, decided)
     asked: list[int] = []
-
-    def ask(tick: int, state: Vector) -> Vector:
-        asked.append(tick)
-        return decided(tick, state)
-
     for _ in range(2):
         asked.clear()
         # Equal inputs, not the same objects.
         state = CODEC.unpack(CODEC.pack(START))
-        assert first.again()(CODEC, state, WORD, list(KNOWN), ask) is flown
+        assert first.again()(CODEC, state, WORD, list(KNOWN), noting(asked, decided)) is flown
         assert asked == [first_tick() + at for at in range(CODEC.ticks_per_sample)]
     assert computed == [WORD]
 
@@ -81,12 +86,7 @@ def test_what_is_asked_in_another_way_is_computed(
     first = Walk()
     flown = first.first(CODEC, START, WORD, KNOWN, decided)
     asked: list[int] = []
-
-    def ask(tick: int, live: Vector) -> Vector:
-        asked.append(tick)
-        return decide(tick, live)
-
-    other = first.again()(CODEC, state, word, known, ask)
+    other = first.again()(CODEC, state, word, known, noting(asked, decide))
     assert other == fly_sample(CODEC, state, word, known, decide) != flown
     assert len(asked) == len(set(asked)) == CODEC.ticks_per_sample, "asked twice for a tick"
     assert len(computed) == 2
